@@ -200,9 +200,10 @@ int run_plan(const Options& options) {
         try {
             result = plan(context, *pattern, job);
         } catch (const Error& error) {
-            if (error.code() != "undercut.unmade" || options.json || options.quiet) throw;
+            if (error.code() != "undercut.unmade" || options.quiet) throw;
             refused = error;
-            return ways_out_text(context, *pattern, job, options.out);
+            const WaysOut ways = find_ways_out(context, *pattern, job, options.out);
+            return options.json ? ways_out_json(ways) : ways_out_text(ways);
         }
         if (!options.access_maps.empty())
             write_access_maps(context, result, options.stl, options.access_maps);
@@ -221,7 +222,7 @@ int run_plan(const Options& options) {
                                 : lies + summary(result, options.out) + verdict(found, options.out);
         });
     });
-    if (refused) return complain(*refused, false);
+    if (refused) return complain(*refused, options.json);
     const std::span<const Error> refusals(found.refusals);
     if (options.json && !refusals.empty()) return complain(refusals[0], true, refusals.subspan(1));
     constexpr std::size_t shown = 20;  // one line each

@@ -67,7 +67,22 @@ std::string pocket_lines(const UnmadeAir& air, std::size_t most, const std::stri
                             p.volume_mm3 / 1000, p.height_mm, p.at[0], p.at[1], p.at[2]);
     }
     if (air.pockets.size() > most)
-        text += fmt::format("{}and {} places more\n", indent, air.pockets.size() - most);
+        text += fmt::format("{}and in {} more\n", indent, air.pockets.size() - most);
+    return text;
+}
+
+std::string milled_ways_table(std::span<const MilledWay> ways) {
+    std::string text = fmt::format("  {:>12}  {:>21}  {:>19}  {:>19}\n", "--turn", "size, mm",
+                                   "from above, cm3", "on both sides, cm3");
+    for (const MilledWay& way : ways) {
+        const auto cell = [](const MilledLayers& layers) {
+            return fmt::format("{:.2f} in {:>2} layers", layers.air.volume_mm3 / 1000, layers.tops.size());
+        };
+        text += fmt::format("  {:>12}  {:>21}  {:>19}  {:>19}{}\n",
+                            fmt::format("{:g},{:g},{:g}", way.turn[0], way.turn[1], way.turn[2]),
+                            fmt::format("{:.0f} x {:.0f} x {:.0f}", way.size[0], way.size[1], way.size[2]),
+                            cell(way.above), cell(way.both_sides), way.has_room ? "" : "  no room for it");
+    }
     return text;
 }
 
@@ -81,18 +96,7 @@ std::string milled_ways_text(std::span<const MilledWay> ways) {
     text += fmt::format("              milled on both sides, in {} layers: {}\n", lies.both_sides.tops.size(),
                         air_words(lies.both_sides.air));
     text += pocket_lines(lies.both_sides.air, 5, "                ");
-    text += fmt::format("  {:>12}  {:>21}  {:>19}  {:>19}\n", "--turn", "size, mm", "from above, cm3",
-                        "on both sides, cm3");
-    for (const MilledWay& way : ways) {
-        const auto cell = [](const MilledLayers& layers) {
-            return fmt::format("{:.2f} in {:>2} layers", layers.air.volume_mm3 / 1000, layers.tops.size());
-        };
-        text += fmt::format("  {:>12}  {:>21}  {:>19}  {:>19}{}\n",
-                            fmt::format("{:g},{:g},{:g}", way.turn[0], way.turn[1], way.turn[2]),
-                            fmt::format("{:.0f} x {:.0f} x {:.0f}", way.size[0], way.size[1], way.size[2]),
-                            cell(way.above), cell(way.both_sides), way.has_room ? "" : "  no room for it");
-    }
-    return text;
+    return text + milled_ways_table(ways);
 }
 
 }  // namespace slabwright

@@ -18,6 +18,9 @@ void put_milled_ways(JsonText& json, std::span<const MilledWay> ways);
 /// A line each for the largest pockets: volume, height and place. @param indent before each line
 [[nodiscard]] std::string pocket_lines(const UnmadeAir& air, std::size_t most, const std::string& indent);
 
+/// A line for each side down: what stays of it, milled from above and on both sides.
+[[nodiscard]] std::string milled_ways_table(std::span<const MilledWay> ways);
+
 /// Lines of `inspect`: what stays as it lies and where, and a table of the sides down where there are more.
 [[nodiscard]] std::string milled_ways_text(std::span<const MilledWay> ways);
 
