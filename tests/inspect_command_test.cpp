@@ -9,6 +9,7 @@
 #include "io/write/stl_writer.h"
 #include "kernels/mesh/weld.h"
 #include "tests/support/command.h"
+#include "tests/support/files.h"
 #include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tunnels.h"
@@ -100,6 +101,34 @@ TEST(InspectCommand, GoesOnWhereNoLayersCanBePlaced) {
     bool noted = false;
     for (const json& d : report.at("diagnostics")) noted |= d.at("code") == "layers.request";
     EXPECT_TRUE(noted);
+}
+
+TEST(InspectCommand, TellsDraftThinWallsAndCorners) {
+    const TemporaryFolder folder;
+    const std::string stl = tunnelled(folder), map = folder / "draw.ply";
+    const CommandResult told =
+        slabwright_command({"inspect", stl, "--json", "--draft", "2", "--thin", "20", "--map", map});
+    ASSERT_EQ(told.exit, 0) << told.err;
+    EXPECT_EQ(schema_complaint(told.out, kSchema), "");
+    const json draw = json::parse(told.out).at("draw");
+    EXPECT_EQ(draw.at("limits").at("draft_deg"), 2);
+    // The block's four sides, less the tunnel's two mouths, and a strip of the tunnel.
+    const double sides = 2 * (80 + 40) * 60 - 2 * std::numbers::pi * 144;
+    EXPECT_NEAR(draw.at("little_draft").at("area").get<double>(), sides, 0.05 * sides);
+    EXPECT_NEAR(draw.at("undercut_to_draw").at("area").get<double>(), std::numbers::pi * 12 * 40, 20);
+    EXPECT_NEAR(draw.at("undercut_to_draw").at("largest")[0].at("draft_deg").get<double>(), -90, 1);
+    const json thin = draw.at("thin_walls").at("largest");
+    ASSERT_FALSE(thin.empty()) << "18 mm stay over and under the tunnel";
+    EXPECT_NEAR(thin[0].at("thickness").get<double>(), 18, 0.1);
+    EXPECT_EQ(draw.at("inner_corners").at("places"), 0);
+    const std::string ply = slabwright::support::slurp(map);
+    EXPECT_EQ(ply.substr(0, 4), "ply\n");
+    EXPECT_NE(ply.find("property float thickness\n"), std::string::npos);
+    const CommandResult people = slabwright_command({"inspect", stl, "--draft", "2"});
+    EXPECT_NE(people.out.find("draft under 2 deg: "), std::string::npos) << people.out;
+    EXPECT_NE(people.out.find("undercut to the draw: "), std::string::npos) << people.out;
+    EXPECT_EQ(slabwright_command({"inspect", stl, "--draft", "50"}).exit, 2);
+    EXPECT_EQ(slabwright_command({"inspect", stl, "--map", folder / "no/such/place.ply"}).exit, 3);
 }
 
 }  // namespace

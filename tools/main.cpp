@@ -49,6 +49,7 @@ extern "C" void on_signal(int signal) {
 
 struct Options {
     PrepareOptions prepare;
+    InspectionOptions inspection;
     std::string pdf;  ///< of the setup sheets; "": none
     std::string orient, repair, stl, out, maps, access_maps, job_file, tools, units, strategy, finder, device,
         post;
@@ -289,7 +290,8 @@ void run_report(const Options& options) {
 void run_inspect(const Options& options) {
     const Job job = job_of(options);
     with_context(options, [&](Context& context) {
-        return inspect(context, options.stl, job, options.json ? InspectionForm::json : InspectionForm::text);
+        return inspect(context, options.stl, job, options.json ? InspectionForm::json : InspectionForm::text,
+                       options.inspection);
     });
 }
 
@@ -372,6 +374,27 @@ void add_common(CLI::App& command, Options& options) {
                   "not close it")
         ->check(CLI::IsMember({"none", "mend", "rebuild"}));
     add_prepare_options(command, options.prepare);
+}
+
+CLI::App* add_inspect_command(CLI::App& app, Options& options) {
+    CLI::App* command = app.add_subcommand(
+        "inspect", "report on mesh, features, undercuts, and what keeps the pattern from being drawn");
+    command->add_option("STL", options.stl, "the pattern")->required();
+    add_common(*command, options);
+    command->add_option("--finder", options.finder, "of features: exact, halving or both")
+        ->check(CLI::IsMember({"exact", "halving", "both"}));
+    DrawLimits& limits = options.inspection.draw;
+    command->add_option("--draft", limits.draft_deg, "degrees: walls with less draft are listed (1)")
+        ->check(CLI::Range(0.0, 45.0));
+    command->add_option("--thin", limits.thin_mm, "mm: thinner walls are listed (4; 0: none)")
+        ->check(CLI::Range(0.0, 1e6));
+    command
+        ->add_option("--corner", limits.corner_deg,
+                     "degrees: inner corners are listed whose faces turn by more (30)")
+        ->check(CLI::Range(1.0, 179.0));
+    command->add_option("--map", options.inspection.map,
+                        "file for the pattern coloured by draft, undercuts to the draw and thin walls, PLY");
+    return command;
 }
 
 CLI::App* add_plan_command(CLI::App& app, Options& options) {
@@ -508,12 +531,7 @@ int command(int argc, char** argv) {
     add_limits(*resume_command, options);
     CLI::App* report_command = add_report_command(app, options);
 
-    CLI::App* inspect_command = app.add_subcommand("inspect", "report on mesh, features and undercuts");
-    inspect_command->add_option("STL", options.stl, "the pattern")->required();
-    add_common(*inspect_command, options);
-    inspect_command->add_option("--finder", options.finder, "of features: exact, halving or both")
-        ->check(CLI::IsMember({"exact", "halving", "both"}));
-
+    CLI::App* inspect_command = add_inspect_command(app, options);
     CLI::App* repair_command = add_repair_command(app, options);
     CLI::App* slice_command = app.add_subcommand("slice", "cut the pattern by level planes");
     slice_command->add_option("STL", options.stl, "the pattern")->required();
