@@ -8,6 +8,7 @@
 #include <numbers>
 #include <random>
 
+#include "io/write/report_draw.h"
 #include "kernels/access/wall_thickness.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/facet_roles.h"
@@ -155,6 +156,23 @@ TEST(Draw, InnerCornersAreToldByLength) {
     EXPECT_TRUE(checked(step, {.corner_deg = 91}).corners.empty());
     EXPECT_TRUE(checked(shapes::box({0, 0, 0}, {60, 40, 30})).corners.empty()) << "its edges are outer ones";
     EXPECT_TRUE(checked(shapes::torus(60, 40, 10)).corners.empty()) << "round enough";
+}
+
+TEST(Draw, APictureOfFewerFacetsHasItsCodes) {
+    // A plate of 3 mm on edge under a roof: upright, thin and undercut facets.
+    Facets facets = shapes::box({0, 0, 0}, {60, 40, 10});
+    shapes::append(facets, shapes::box({10, 19, 9}, {50, 22, 40}));
+    shapes::append(facets, shapes::box({0, 0, 39}, {60, 40, 50}));
+    Context context;
+    const Mesh mesh = solid(facets);
+    const DrawReport report = check_draw(context, mesh.view());
+    // Facets in the middle of a side of the foot, of its top, of the plate and of the roof's underside.
+    const auto at = [](float x, float y, float z) { return Vec3f{x, y, z}; };
+    const Mesh picture = solid({{at(20, 0, 3), at(40, 0, 3), at(30, 0, 8)},
+                                {at(2, 2, 50), at(8, 2, 50), at(5, 8, 50)},
+                                {at(20, 19, 20), at(40, 19, 20), at(30, 19, 30)},
+                                {at(2, 2, 39), at(5, 8, 39), at(8, 2, 39)}});
+    EXPECT_EQ(draw_codes(context, mesh.view(), report, picture.view()), std::string({1, 0, 3, 2}));
 }
 
 TEST(Draw, LimitsOutOfRangeAreTold) {
