@@ -127,6 +127,7 @@ struct DrawnPaths {
 struct Figures {
     Json data;
     DrawnPaths drawn;
+    DrawReport draw;
     Json replay;                 ///< the stock's cells, left-over maps
     Json wood;                   ///< what stands of each layer in the end
     Json feeds = Json::array();  ///< of each program
@@ -273,9 +274,10 @@ void draw_glue(const Json& sequence, Json& layers) {
     }
 }
 
-/// Sections at the layers' ends, glue, silhouettes, slopes: what pictures are drawn from.
+/// Sections at the layers' ends, glue, silhouettes, slopes, draft: what pictures are drawn from.
 void draw_figures(Context& context, MeshView mesh, const PlannedFolder& folder, const Json& sequence,
-                  Json& data) {
+                  Figures& figures) {
+    Json& data = figures.data;
     const SimulationInput& input = folder.simulation;
     const Box3 box = bounds(context, mesh);
     std::vector<Plane> planes;
@@ -317,6 +319,10 @@ void draw_figures(Context& context, MeshView mesh, const PlannedFolder& folder, 
                       {"area_mm2", std::move(areas)},
                       {"down_flat_mm2", rounded(slopes.down_flat_mm2, 1)},
                       {"undercut_mm2", rounded(slopes.undercut_mm2, 1)}};
+    figures.draw = check_draw(context, mesh);
+    JsonText draw;
+    put_draw(draw, figures.draw);
+    data["draw"] = Json::parse(draw.take());
 }
 
 /// The pattern for the 3D view: places as 16-bit shares of its box.
@@ -498,10 +504,6 @@ std::string report_html(Context& context, const std::string& directory, const Re
     Figures figures;
     figures.data = {
         {"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", plan}, {"verify", verify}};
-    const DrawReport drawn = check_draw(context, mesh);
-    JsonText draw_text;
-    put_draw(draw_text, drawn);
-    figures.data["draw"] = Json::parse(draw_text.take());
     const auto draw = [&] {
         Json& steps = figures.data["steps"] = Json::array();
         if (sequence.is_object())
@@ -509,7 +511,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
                 steps.push_back({step.at("layer").get<int>(), step.at("action").get<std::string>(),
                                  step.at("seconds").get<double>(),
                                  step.value("program", step["action"] == "load_tool" ? step : Json())});
-        draw_figures(context, mesh, folder, sequence, figures.data);
+        draw_figures(context, mesh, folder, sequence, figures);
         return 0;
     };
     SimulationInput input = folder.simulation;
@@ -528,7 +530,6 @@ std::string report_html(Context& context, const std::string& directory, const Re
                         options.three_d ? &*pattern->part : nullptr, figures);
     });
     context.throw_if_cancelled();
-
     const auto limit = static_cast<std::size_t>(options.size_limit_mb * 1e6);
     const auto too_large = [&](std::size_t size) {
         return Error(ErrorKind::usage, "report.size_limit",
@@ -548,7 +549,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
     Json model, paths;
     parallel_each(context, 2, [&](std::size_t i) {
         if (i > 0) paths = paths_json(context, figures.drawn, folder, points);
-        else model = model_json(context, mesh, std::move(decimated), *pattern->part, folder, drawn);
+        else model = model_json(context, mesh, std::move(decimated), *pattern->part, folder, figures.draw);
         context.advance();
     });
     for (;;) {
@@ -566,7 +567,8 @@ std::string report_html(Context& context, const std::string& directory, const Re
             paths = paths_json(context, figures.drawn, folder, points);
         } else if (facets > kFewestFacets) {
             facets /= 2;
-            model = model_json(context, mesh, decimate(context, mesh, facets), *pattern->part, folder, drawn);
+            model = model_json(context, mesh, decimate(context, mesh, facets), *pattern->part, folder,
+                               figures.draw);
         } else {
             throw too_large(text.size());
         }

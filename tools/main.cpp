@@ -26,6 +26,7 @@
 #include "io/ways_out.h"
 #include "tools/allocator.h"
 #include "tools/bond_command.h"
+#include "tools/inspect_command.h"
 #include "tools/job_command.h"
 #include "tools/plan_text.h"
 #include "tools/prepare_command.h"
@@ -34,6 +35,7 @@
 #include "tools/resume_command.h"
 #include "tools/sheets_command.h"
 #include "tools/split_command.h"
+#include "tools/streams.h"
 
 namespace {
 
@@ -58,30 +60,6 @@ struct Options {
     bool allow_undercut = false, accept_weak = false, no_verify = false, keep_failed = false, json = false,
          quiet = false, weld_given = false, no_3d = false, rebuild = false;
 };
-
-/// @param also further errors of the same kind, which JSON names in the same object
-int complain(const Error& error, bool as_json, std::span<const Error> also = {}) {
-    // One error, one line, whatever a file name or a parser's message holds.
-    const std::string line = as_json
-                                 ? error_json(error, also)
-                                 : terminal_text(fmt::format("slabwright: {}", error.what()), true) + '\n';
-    std::fwrite(line.data(), 1, line.size(), stderr);
-    return static_cast<int>(error.kind());
-}
-
-/// Whether all that went to stdout has arrived, on a full disk for one. @throws Error(input) when not
-void require_told(bool arrived) {
-    if (arrived) return;
-    throw Error(ErrorKind::input, "stdout.unwritable",
-                fmt::format("standard output cannot be written: {}", std::strerror(errno)), "",
-                "make room where it goes, or send it elsewhere");
-}
-
-void print(std::string_view text) {
-    const std::string shown = terminal_text(text, false);
-    const bool written = std::fwrite(shown.data(), 1, shown.size(), stdout) == shown.size();
-    require_told(written && std::fflush(stdout) == 0);
-}
 
 Job job_of(const Options& options) {
     const Job job = read_job(options.job_file, options.tools, options.post);
@@ -383,17 +361,7 @@ CLI::App* add_inspect_command(CLI::App& app, Options& options) {
     add_common(*command, options);
     command->add_option("--finder", options.finder, "of features: exact, halving or both")
         ->check(CLI::IsMember({"exact", "halving", "both"}));
-    DrawLimits& limits = options.inspection.draw;
-    command->add_option("--draft", limits.draft_deg, "degrees: walls with less draft are listed (1)")
-        ->check(CLI::Range(0.0, 45.0));
-    command->add_option("--thin", limits.thin_mm, "mm: thinner walls are listed (4; 0: none)")
-        ->check(CLI::Range(0.0, 1e6));
-    command
-        ->add_option("--corner", limits.corner_deg,
-                     "degrees: inner corners are listed whose faces turn by more (30)")
-        ->check(CLI::Range(1.0, 179.0));
-    command->add_option("--map", options.inspection.map,
-                        "file for the pattern coloured by draft, undercuts to the draw and thin walls, PLY");
+    add_inspection_options(*command, options.inspection);
     return command;
 }
 
