@@ -17,16 +17,18 @@
 #include <vector>
 
 #include "engine/base_board.h"
-#include "engine/simulate/reach.h"
 #include "engine/simulate/replay.h"
 #include "io/read/input_file.h"
 #include "io/read/planned_folder.h"
 #include "io/report_template.h"
 #include "io/text/base64.h"
 #include "io/text/json_text.h"
+#include "io/write/draw_json.h"
 #include "io/write/output_file.h"
 #include "io/write/report_as_built.h"
+#include "io/write/report_draw.h"
 #include "io/write/report_outlines.h"
+#include "io/write/report_reach.h"
 #include "io/write/thinned_path.h"
 #include "kernels/access/deviation.h"
 #include "kernels/errors.h"
@@ -50,8 +52,6 @@ constexpr double kWidestTolerance = 2.0;  // mm; paths that need more are left o
 constexpr double kStockCells = 80'000, kAllStockCells = 800'000;  // of one layer's map, and of all
 constexpr double kFinestCell = 0.25;                              // mm
 constexpr int kSilhouetteRows = 140, kSlopeRows = 200;
-constexpr double kReachCells = 2'500;   // of the surface, that the accessibility map aims at
-constexpr double kReachDistance = 0.1;  // mm from the surface that a tool must come to reach it
 
 constexpr std::string_view kDataMark = "/*slabwright:data*/null";
 constexpr std::string_view kModelBegin = "<!--slabwright:3d-->", kModelEnd = "<!--/slabwright:3d-->";
@@ -127,6 +127,7 @@ struct DrawnPaths {
 struct Figures {
     Json data;
     DrawnPaths drawn;
+    DrawReport draw;
     Json replay;                 ///< the stock's cells, left-over maps
     Json wood;                   ///< what stands of each layer in the end
     Json feeds = Json::array();  ///< of each program
@@ -273,9 +274,10 @@ void draw_glue(const Json& sequence, Json& layers) {
     }
 }
 
-/// Sections at the layers' ends, glue, silhouettes, slopes: what pictures are drawn from.
+/// Sections at the layers' ends, glue, silhouettes, slopes, draft: what pictures are drawn from.
 void draw_figures(Context& context, MeshView mesh, const PlannedFolder& folder, const Json& sequence,
-                  Json& data) {
+                  Figures& figures) {
+    Json& data = figures.data;
     const SimulationInput& input = folder.simulation;
     const Box3 box = bounds(context, mesh);
     std::vector<Plane> planes;
@@ -317,84 +319,16 @@ void draw_figures(Context& context, MeshView mesh, const PlannedFolder& folder, 
                       {"area_mm2", std::move(areas)},
                       {"down_flat_mm2", rounded(slopes.down_flat_mm2, 1)},
                       {"undercut_mm2", rounded(slopes.undercut_mm2, 1)}};
-}
-
-/// For every facet of the picture: 0 faces down, 1 some tool reaches its middle, 2 none was found that does.
-/// Facets that lie in one small cell and face about the same way share the answer of the first of them,
-/// because a search without success is long.
-struct ReachMap {
-    std::string codes;
-    double cell_mm = 0;
-};
-ReachMap reach_map(Context& context, const StandingPart& part, const PlannedFolder& folder, MeshView model) {
-    const SimulationInput& input = folder.simulation;
-    const double board = board_cut_limit(folder.build.job.machine, input.tools);
-    const auto reach_of = [&](std::size_t l) {
-        const SimulatedLayer& layer = input.layers[l];
-        return std::make_unique<Reach>(part, input.tools, layer.z_bottom, layer.z_top,
-                                       l == 0 ? layer.z_bottom - board : -kUnbounded);
-    };
-
-    struct Side {
-        Point3 middle{}, normal{};
-        double area = 0;
-    };
-    const auto side_of = [&](std::size_t f) {
-        const Vec3f &a = model.vertices[model.facets[f][0]], &b = model.vertices[model.facets[f][1]],
-                    &c = model.vertices[model.facets[f][2]];
-        const double ux = double{b.x} - a.x, uy = double{b.y} - a.y, uz = double{b.z} - a.z;
-        const double vx = double{c.x} - a.x, vy = double{c.y} - a.y, vz = double{c.z} - a.z;
-        const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx,
-                     n = std::sqrt(nx * nx + ny * ny + nz * nz);
-        Side side{
-            {(double{a.x} + b.x + c.x) / 3, (double{a.y} + b.y + c.y) / 3, (double{a.z} + b.z + c.z) / 3},
-            {},
-            n / 2};
-        if (n > 0) side.normal = {nx / n, ny / n, nz / n};
-        return side;
-    };
-    ReachMap map;
-    map.codes.assign(model.facets.size(), '\0');
-    double area = 0;
-    for (std::size_t f = 0; f < model.facets.size(); ++f) area += side_of(f).area;
-    map.cell_mm = std::max(0.1, std::sqrt(area / kReachCells));
-    std::map<std::array<long, 6>, std::size_t> groups;
-    std::vector<Side> asked;
-    std::vector<std::size_t> group(model.facets.size(), 0);
-    for (std::size_t f = 0; f < model.facets.size(); ++f) {
-        const Side side = side_of(f);
-        if (!(side.area > 0) || side.normal[2] < -1e-3) continue;
-        std::array<long, 6> key{};
-        for (std::size_t k = 0; k < 3; ++k) {
-            key[k] = std::lround(std::floor(side.middle[k] / map.cell_mm));
-            key[k + 3] = std::lround(2 * side.normal[k]);
-        }
-        const auto [entry, fresh] = groups.try_emplace(key, asked.size());
-        if (fresh) asked.push_back(side);
-        group[f] = entry->second + 1;
-    }
-    std::string answers(asked.size(), '\0');
-    parallel_for(context, asked.size(), 64, [&](std::size_t begin, std::size_t end) {
-        std::vector<std::unique_ptr<Reach>> reaches(
-            input.layers.size());  // a search remembers, so that no two threads may share it
-        for (std::size_t i = begin; i < end; ++i) {
-            Point3 p = asked[i].middle;
-            std::size_t layer = 0;
-            while (layer + 1 < input.layers.size() && p[2] > input.layers[layer].z_top) ++layer;
-            for (std::size_t k = 0; k < 3; ++k) p[k] += kReachDistance * asked[i].normal[k];
-            if (!reaches[layer]) reaches[layer] = reach_of(layer);
-            answers[i] = reaches[layer]->reachable(p) ? 1 : 2;
-        }
-    });
-    for (std::size_t f = 0; f < model.facets.size(); ++f)
-        if (group[f] > 0) map.codes[f] = answers[group[f] - 1];
-    return map;
+    figures.draw = check_draw(context, mesh);
+    JsonText draw;
+    put_draw(draw, figures.draw);
+    data["draw"] = Json::parse(draw.take());
 }
 
 /// The pattern for the 3D view: places as 16-bit shares of its box.
 /// @param model of the mesh, decimated
 Json model_json(Context& context, MeshView mesh, Mesh model, const StandingPart& part,
-                const PlannedFolder& folder) {
+                const PlannedFolder& folder, const DrawReport& draw) {
     const Box3 box = bounds(context, mesh);
     const float low[3] = {box.min.x, box.min.y, box.min.z}, high[3] = {box.max.x, box.max.y, box.max.z};
     std::string vertices, indices;
@@ -409,7 +343,9 @@ Json model_json(Context& context, MeshView mesh, Mesh model, const StandingPart&
                 low[k] + share * extent / 65535);  // so that the stated error is that of what is shown
         }
     }
-    const ReachMap reach = reach_map(context, part, folder, model.view());
+    const SimulationInput& input = folder.simulation;
+    const ReachMap reach =
+        reach_map(context, part, input, board_cut_limit(folder.build.job.machine, input.tools), model.view());
     const bool narrow = model.vertices.size() <= 65536;
     for (const Index3& f : model.facets)
         for (const std::uint32_t v : f) {
@@ -426,7 +362,8 @@ Json model_json(Context& context, MeshView mesh, Mesh model, const StandingPart&
             {"indices", base64(indices)},
             {"reach_mm", kReachDistance},
             {"reach_cell_mm", rounded(reach.cell_mm, 2)},
-            {"reach", base64(reach.codes)}};
+            {"reach", base64(reach.codes)},
+            {"draw", base64(draw_codes(context, mesh, draw, model.view()))}};
 }
 
 /// All paths within a number of points: the tolerance is doubled until they fit, then the longest are left
@@ -574,7 +511,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
                 steps.push_back({step.at("layer").get<int>(), step.at("action").get<std::string>(),
                                  step.at("seconds").get<double>(),
                                  step.value("program", step["action"] == "load_tool" ? step : Json())});
-        draw_figures(context, mesh, folder, sequence, figures.data);
+        draw_figures(context, mesh, folder, sequence, figures);
         return 0;
     };
     SimulationInput input = folder.simulation;
@@ -593,7 +530,6 @@ std::string report_html(Context& context, const std::string& directory, const Re
                         options.three_d ? &*pattern->part : nullptr, figures);
     });
     context.throw_if_cancelled();
-
     const auto limit = static_cast<std::size_t>(options.size_limit_mb * 1e6);
     const auto too_large = [&](std::size_t size) {
         return Error(ErrorKind::usage, "report.size_limit",
@@ -613,7 +549,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
     Json model, paths;
     parallel_each(context, 2, [&](std::size_t i) {
         if (i > 0) paths = paths_json(context, figures.drawn, folder, points);
-        else model = model_json(context, mesh, std::move(decimated), *pattern->part, folder);
+        else model = model_json(context, mesh, std::move(decimated), *pattern->part, folder, figures.draw);
         context.advance();
     });
     for (;;) {
@@ -631,7 +567,8 @@ std::string report_html(Context& context, const std::string& directory, const Re
             paths = paths_json(context, figures.drawn, folder, points);
         } else if (facets > kFewestFacets) {
             facets /= 2;
-            model = model_json(context, mesh, decimate(context, mesh, facets), *pattern->part, folder);
+            model = model_json(context, mesh, decimate(context, mesh, facets), *pattern->part, folder,
+                               figures.draw);
         } else {
             throw too_large(text.size());
         }

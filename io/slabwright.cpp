@@ -474,10 +474,11 @@ VerifyResult verify(Context& context, const std::string& directory, const Patter
     });
 }
 
-std::string inspect(Context& context, const PatternSource& source, const Job& job, InspectionForm form) {
+std::string inspect(Context& context, const PatternSource& source, const Job& job, InspectionForm form,
+                    const InspectionOptions& options) {
     return guarded([&] {
         validate(job);
-        const Inspection found = inspect_pattern(context, source, job);
+        const Inspection found = inspect_pattern(context, source, job, options);
         return form == InspectionForm::json ? inspection_json(found) : inspection_text(found);
     });
 }

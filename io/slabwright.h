@@ -25,6 +25,7 @@
 #include "io/read/pattern_source.h"
 #include "kernels/errors.h"
 #include "kernels/export.h"
+#include "kernels/features/draw.h"
 #include "kernels/parallel/context.h"
 
 namespace slabwright {
@@ -206,9 +207,16 @@ enum class InspectionForm : std::uint8_t {
     text,  ///< a few lines for people
 };
 
-/// Mesh report, features and undercuts of a pattern.
+struct InspectionOptions {
+    DrawLimits draw;  ///< of what keeps it from being drawn
+    std::string map;  ///< file for the pattern coloured by that, PLY; "": none
+};
+
+/// Mesh report, features, undercuts, what layers leave on each side, and what keeps the pattern from being
+/// drawn. @throws Error(input) when the file cannot be read or the map not written, Error(usage)
 [[nodiscard]] SLABWRIGHT_API std::string inspect(Context& context, const PatternSource& source,
-                                                 const Job& job, InspectionForm form = InspectionForm::json);
+                                                 const Job& job, InspectionForm form = InspectionForm::json,
+                                                 const InspectionOptions& options = {});
 
 /// What a repair did.
 struct RepairResult {

@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <string_view>
 
-#include "engine/planner/ways_out.h"
 #include "engine/prepare/preparation.h"
 #include "io/read/pattern.h"
+#include "io/text/json_text.h"
+#include "io/write/milled_ways_json.h"
 
 namespace slabwright {
 
@@ -52,33 +53,75 @@ std::string repeated(const PrepareJob& job, bool turns) {
 
 }  // namespace
 
-std::string ways_out_text(Context& context, const Pattern& pattern, const Job& job, const std::string& out) {
+WaysOut find_ways_out(Context& context, const Pattern& pattern, const Job& job, const std::string& out) {
+    WaysOut found;
     const Mesh& mesh = pattern.read.mesh;
-    if (mesh.facets.size() > kMostFacets) return {};
+    if (mesh.facets.size() > kMostFacets) return found;
     context.begin_phase("ways out", 0.9, 1.0);
-    const Lying now = lying(context, mesh.view(), job);
+    found.looked = true;
+    found.lies = lying(context, mesh.view(), job);
+    found.milled = milled_ways(context, mesh.view(), job);
     const PrepareJob& p = job.prepare;
     const bool may_turn = std::all_of(p.turn.begin(), p.turn.end(), [](double d) { return d == 0; }) &&
                           p.scale[0] == p.scale[1] && p.scale[1] == p.scale[2] &&
                           p.mirror == MirrorAxis::none && p.skin == 0;
-    std::string text;
     const std::string from = word(pattern.place);
-    for (const WayOut& way : ways_out(context, mesh.view(), pattern.read.report, job, now)) {
+    for (const WayOut& way : ways_out(context, mesh.view(), pattern.read.report, job, found.lies)) {
         if (way.turn && !may_turn) continue;
         if (way.turn) {
-            text += fmt::format("  slabwright plan {} -o {} --turn {:g},{:g},{:g}{}\n", from, word(out),
-                                (*way.turn)[0], (*way.turn)[1], (*way.turn)[2], repeated(p, false));
+            found.commands.push_back(
+                {fmt::format("slabwright plan {} -o {} --turn {:g},{:g},{:g}{}", from, word(out),
+                             (*way.turn)[0], (*way.turn)[1], (*way.turn)[2], repeated(p, false)),
+                 way});
         } else {
             const Vec3d& n = way.plane->normal;
-            text += fmt::format("  slabwright split {} --plane {:g},{:g},{:g},{:.9g} -o {} {}{}\n", from,
-                                n[0], n[1], n[2], way.plane->offset_mm, word(out + "-above.stl"),
-                                word(out + "-below.stl"), repeated(p, true));
+            found.commands.push_back(
+                {fmt::format("slabwright split {} --plane {:g},{:g},{:g},{:.9g} -o {} {}{}", from, n[0], n[1],
+                             n[2], way.plane->offset_mm, word(out + "-above.stl"), word(out + "-below.stl"),
+                             repeated(p, true)),
+                 way});
         }
-        text += fmt::format("    {}{}\n", leaves(way.outcome),
-                            way.turn ? "" : " in both halves, to be planned one by one");
     }
-    if (text.empty()) return "neither another side down nor two halves would build much more of it\n";
-    return fmt::format("as it lies it {}; better would be\n{}", leaves(now), text);
+    return found;
+}
+
+std::string ways_out_text(const WaysOut& ways) {
+    if (!ways.looked) return {};
+    std::string text = fmt::format("as it lies it {}; the largest places are\n", leaves(ways.lies));
+    text += pocket_lines(ways.milled.front().above.air, 3, "    ");
+    text += ways.commands.empty() ? "neither another side down nor two halves would build much more of it\n"
+                                  : "better would be\n";
+    for (const WayOutCommand& c : ways.commands)
+        text += fmt::format("  {}\n    {}{}\n", c.command, leaves(c.way.outcome),
+                            c.way.turn ? "" : " in both halves, to be planned one by one");
+    return text +
+           "on each side, slabs milled from above and, which no plan does, on both sides would leave\n" +
+           milled_ways_table(ways.milled);
+}
+
+std::string ways_out_json(const WaysOut& ways) {
+    JsonText json;
+    json.begin_object().key("schema").string("slabwright.ways_out/1").key("units").string("mm");
+    const auto put = [&](const Lying& lying) {
+        json.key("layers").integer(lying.layers).key("unmade_mm3").rounded(lying.unmade_mm3, 1);
+        json.key("unmade_height").rounded(lying.unmade_mm, 3).key("has_room").boolean(lying.has_room);
+    };
+    json.key("looked").boolean(ways.looked).key("commands").begin_array();
+    for (const WayOutCommand& c : ways.commands) {
+        json.begin_object().key("command").string(c.command);
+        json.key("halves").boolean(!c.way.turn.has_value());
+        put(c.way.outcome);
+        json.end();
+    }
+    json.end();
+    if (ways.looked) {
+        json.key("as_it_lies").begin_object();
+        put(ways.lies);
+        json.end().key("ways");
+        put_milled_ways(json, ways.milled);
+    }
+    json.end();
+    return json.take();
 }
 
 }  // namespace slabwright

@@ -171,6 +171,12 @@ TEST(Report, HoldsWhatLiesInTheFolder) {
     EXPECT_EQ(data["paths"]["programs"].size(), static_cast<std::size_t>(planned.totals.operations));
     EXPECT_EQ(data["outlines"]["layers"].size(), planned.layers.size());
     EXPECT_EQ(data["left_over"]["layers"].size(), planned.layers.size());
+    // A dome draws well; each facet of its picture has a code that says so.
+    EXPECT_EQ(data["draw"]["limits"]["draft_deg"], 1);
+    EXPECT_EQ(data["draw"]["undercut_to_draw"]["places"], 0);
+    const std::string codes = data["model"]["draw"];
+    EXPECT_EQ(codes.size(), (data["model"]["facets"].get<std::size_t>() + 2) / 3 * 4) << "of base64";
+    EXPECT_EQ(codes.find_first_not_of("A="), std::string::npos);
     // Nothing asks for a network.
     for (const char* asks : {"src=\"http", "href=\"http", "url(http", "@import", "fetch("})
         EXPECT_EQ(page.find(asks), std::string::npos) << asks;

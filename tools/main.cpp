@@ -26,6 +26,7 @@
 #include "io/ways_out.h"
 #include "tools/allocator.h"
 #include "tools/bond_command.h"
+#include "tools/inspect_command.h"
 #include "tools/job_command.h"
 #include "tools/plan_text.h"
 #include "tools/prepare_command.h"
@@ -34,6 +35,7 @@
 #include "tools/resume_command.h"
 #include "tools/sheets_command.h"
 #include "tools/split_command.h"
+#include "tools/streams.h"
 
 namespace {
 
@@ -49,6 +51,7 @@ extern "C" void on_signal(int signal) {
 
 struct Options {
     PrepareOptions prepare;
+    InspectionOptions inspection;
     std::string pdf;  ///< of the setup sheets; "": none
     std::string orient, repair, stl, out, maps, access_maps, job_file, tools, units, strategy, finder, device,
         post;
@@ -57,30 +60,6 @@ struct Options {
     bool allow_undercut = false, accept_weak = false, no_verify = false, keep_failed = false, json = false,
          quiet = false, weld_given = false, no_3d = false, rebuild = false;
 };
-
-/// @param also further errors of the same kind, which JSON names in the same object
-int complain(const Error& error, bool as_json, std::span<const Error> also = {}) {
-    // One error, one line, whatever a file name or a parser's message holds.
-    const std::string line = as_json
-                                 ? error_json(error, also)
-                                 : terminal_text(fmt::format("slabwright: {}", error.what()), true) + '\n';
-    std::fwrite(line.data(), 1, line.size(), stderr);
-    return static_cast<int>(error.kind());
-}
-
-/// Whether all that went to stdout has arrived, on a full disk for one. @throws Error(input) when not
-void require_told(bool arrived) {
-    if (arrived) return;
-    throw Error(ErrorKind::input, "stdout.unwritable",
-                fmt::format("standard output cannot be written: {}", std::strerror(errno)), "",
-                "make room where it goes, or send it elsewhere");
-}
-
-void print(std::string_view text) {
-    const std::string shown = terminal_text(text, false);
-    const bool written = std::fwrite(shown.data(), 1, shown.size(), stdout) == shown.size();
-    require_told(written && std::fflush(stdout) == 0);
-}
 
 Job job_of(const Options& options) {
     const Job job = read_job(options.job_file, options.tools, options.post);
@@ -200,9 +179,10 @@ int run_plan(const Options& options) {
         try {
             result = plan(context, *pattern, job);
         } catch (const Error& error) {
-            if (error.code() != "undercut.unmade" || options.json || options.quiet) throw;
+            if (error.code() != "undercut.unmade" || options.quiet) throw;
             refused = error;
-            return ways_out_text(context, *pattern, job, options.out);
+            const WaysOut ways = find_ways_out(context, *pattern, job, options.out);
+            return options.json ? ways_out_json(ways) : ways_out_text(ways);
         }
         if (!options.access_maps.empty())
             write_access_maps(context, result, options.stl, options.access_maps);
@@ -221,7 +201,7 @@ int run_plan(const Options& options) {
                                 : lies + summary(result, options.out) + verdict(found, options.out);
         });
     });
-    if (refused) return complain(*refused, false);
+    if (refused) return complain(*refused, options.json);
     const std::span<const Error> refusals(found.refusals);
     if (options.json && !refusals.empty()) return complain(refusals[0], true, refusals.subspan(1));
     constexpr std::size_t shown = 20;  // one line each
@@ -288,7 +268,8 @@ void run_report(const Options& options) {
 void run_inspect(const Options& options) {
     const Job job = job_of(options);
     with_context(options, [&](Context& context) {
-        return inspect(context, options.stl, job, options.json ? InspectionForm::json : InspectionForm::text);
+        return inspect(context, options.stl, job, options.json ? InspectionForm::json : InspectionForm::text,
+                       options.inspection);
     });
 }
 
@@ -371,6 +352,17 @@ void add_common(CLI::App& command, Options& options) {
                   "not close it")
         ->check(CLI::IsMember({"none", "mend", "rebuild"}));
     add_prepare_options(command, options.prepare);
+}
+
+CLI::App* add_inspect_command(CLI::App& app, Options& options) {
+    CLI::App* command = app.add_subcommand(
+        "inspect", "report on mesh, features, undercuts, and what keeps the pattern from being drawn");
+    command->add_option("STL", options.stl, "the pattern")->required();
+    add_common(*command, options);
+    command->add_option("--finder", options.finder, "of features: exact, halving or both")
+        ->check(CLI::IsMember({"exact", "halving", "both"}));
+    add_inspection_options(*command, options.inspection);
+    return command;
 }
 
 CLI::App* add_plan_command(CLI::App& app, Options& options) {
@@ -507,12 +499,7 @@ int command(int argc, char** argv) {
     add_limits(*resume_command, options);
     CLI::App* report_command = add_report_command(app, options);
 
-    CLI::App* inspect_command = app.add_subcommand("inspect", "report on mesh, features and undercuts");
-    inspect_command->add_option("STL", options.stl, "the pattern")->required();
-    add_common(*inspect_command, options);
-    inspect_command->add_option("--finder", options.finder, "of features: exact, halving or both")
-        ->check(CLI::IsMember({"exact", "halving", "both"}));
-
+    CLI::App* inspect_command = add_inspect_command(app, options);
     CLI::App* repair_command = add_repair_command(app, options);
     CLI::App* slice_command = app.add_subcommand("slice", "cut the pattern by level planes");
     slice_command->add_option("STL", options.stl, "the pattern")->required();

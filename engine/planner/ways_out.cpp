@@ -54,12 +54,10 @@ Mesh laid_down(MeshView mesh, const std::array<double, 3>& degrees) {
     return result;
 }
 
-LayersOf layers_of(Context& context, MeshView mesh, const Job& job) {
-    const Box3 box = bounds(context, mesh);
-    const FeatureOptions options = feature_options(job);
+LayerRequest quick_layer_request(Context& context, MeshView mesh, const Job& job) {
     // As a plan asks for its layers, but for the wood above a boundary.
     LayerRequest request;
-    request.height = box.max.z;
+    request.height = bounds(context, mesh).max.z;
     request.max_layer = max_layer_thickness(job);
     request.min_layer = job.layers.min_layer;
     request.min_material = job.material.min_thickness > 0 ? job.material.min_thickness : kThinWood;
@@ -69,20 +67,28 @@ LayersOf layers_of(Context& context, MeshView mesh, const Job& job) {
     request.facing_allowance = job.slabs.facing_allowance;
     request.saddles_constrain = job.layers.saddles_constrain;
     request.filled_underside = job.tolerances.undercut;
-    request.features = find_features(context, mesh, options).features;
+    request.features = find_features(context, mesh, feature_options(job)).features;
     request.section_area = SectionAreas(context, mesh);
+    return request;
+}
+
+bool has_room(const Box3& box, const Job& job) {
+    return double{box.max.x} - box.min.x <= job.slabs.length &&
+           double{box.max.y} - box.min.y <= job.slabs.width && box.max.z <= job.machine.build_height;
+}
+
+LayersOf layers_of(Context& context, MeshView mesh, const Job& job) {
+    const LayerRequest request = quick_layer_request(context, mesh, job);
     LayersOf found;
     for (const Boundary& b : place_layers(job.layers.strategy, request).boundaries) found.tops.push_back(b.z);
     Lying& result = found.lying;
     result.layers = static_cast<int>(found.tops.size());
-    for (const UnmadeUndercut& u : measure_undercuts(context, mesh, found.tops, options))
+    for (const UnmadeUndercut& u : measure_undercuts(context, mesh, found.tops, feature_options(job)))
         if (u.thickness_mm > job.tolerances.undercut) {
             result.unmade_mm3 += u.volume_mm3;
             result.unmade_mm = std::max(result.unmade_mm, u.height_mm);
         }
-    result.has_room = double{box.max.x} - box.min.x <= job.slabs.length &&
-                      double{box.max.y} - box.min.y <= job.slabs.width &&
-                      box.max.z <= job.machine.build_height;
+    result.has_room = has_room(bounds(context, mesh), job);
     return found;
 }
 

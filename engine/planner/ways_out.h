@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/job.h"
+#include "engine/layers/layers.h"
 #include "kernels/halves/halves.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/mesh/report.h"
@@ -26,6 +27,13 @@ struct LayersOf {
     Lying lying;
     std::vector<double> tops;
 };
+
+/// What a plan would ask for its layers, but for the wood above a boundary, which is the job's or 5.08 mm.
+/// @param mesh a solid on z = 0; it must outlive the request. @throws as find_features()
+[[nodiscard]] LayerRequest quick_layer_request(Context& context, MeshView mesh, const Job& job);
+
+/// Whether slab and layers hold a part on z = 0 of that box.
+[[nodiscard]] bool has_room(const Box3& box, const Job& job);
 
 /// @param mesh a solid on z = 0. @throws as find_features() and place_layers_optimal()
 [[nodiscard]] LayersOf layers_of(Context& context, MeshView mesh, const Job& job);

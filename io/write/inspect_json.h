@@ -4,7 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "engine/planner/milled_ways.h"
 #include "io/read/pattern_mesh.h"
+#include "io/slabwright.h"
+#include "kernels/features/draw.h"
 #include "kernels/features/features.h"
 #include "kernels/features/holes.h"
 
@@ -22,11 +25,16 @@ struct Inspection {
     /// What would stay unmade if the pattern were one layer; layer boundaries can only make it less.
     std::vector<UnmadeUndercut> undercuts;
     std::vector<RoundHole> holes;
+    /// What the job's layers would leave as it lies, and where that is anything, on its other five sides too.
+    std::vector<MilledWay> ways;
+    DrawReport draw;
 };
 
 /// Reads the file and looks at it. @throws Error(input | usage | cancelled) as read_pattern_mesh; a mesh that
-/// is read but not solid is a finding
-[[nodiscard]] Inspection inspect_pattern(Context& context, const PatternSource& source, const Job& job);
+/// is read but not solid is a finding; Error(usage, "draw.limits"), and where the map cannot be written
+/// Error(input)
+[[nodiscard]] Inspection inspect_pattern(Context& context, const PatternSource& source, const Job& job,
+                                         const InspectionOptions& options = {});
 
 /// Schema slabwright.inspect/1.
 [[nodiscard]] std::string inspection_json(const Inspection& inspection);

@@ -167,6 +167,30 @@ double FacetScene::first_below(double x, double y, double z, bool& leaves_solid,
     return z - static_cast<double>(ray.ray.tfar);
 }
 
+FacetScene::RayHit FacetScene::first_along(const Point3& from, const Vec3d& direction, double least,
+                                           double most) const {
+    RTCRayHit ray{};
+    ray.ray.org_x = static_cast<float>(from[0]);
+    ray.ray.org_y = static_cast<float>(from[1]);
+    ray.ray.org_z = static_cast<float>(from[2]);
+    ray.ray.dir_x = static_cast<float>(direction[0]);
+    ray.ray.dir_y = static_cast<float>(direction[1]);
+    ray.ray.dir_z = static_cast<float>(direction[2]);
+    ray.ray.tnear = static_cast<float>(least);
+    ray.ray.tfar = static_cast<float>(most);
+    ray.ray.mask = 0xFFFFFFFFu;
+    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+#if defined(RTC_VERSION_MAJOR) && RTC_VERSION_MAJOR >= 4
+    rtcIntersect1(all_.get(), &ray);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(all_.get(), &context, &ray);
+#endif
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+    return {ray.hit.primID, static_cast<double>(ray.ray.tfar)};
+}
+
 bool FacetScene::overhung(const Point3& from, double top) const {
     if (!hanging_ || from[2] >= top) return false;
     RTCRay ray{};

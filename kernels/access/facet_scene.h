@@ -66,6 +66,13 @@ public:
     /// The height of the first facet that a ray down from z meets, or `none`.
     /// @param leaves_solid whether it leaves the solid there
     [[nodiscard]] double first_below(double x, double y, double z, bool& leaves_solid, double none) const;
+    struct RayHit {
+        std::uint32_t facet = kNoFacet;  ///< kNoFacet: none
+        double distance = 0;             ///< mm
+    };
+    /// The first facet that a ray meets, from `least` to `most` mm along a unit direction.
+    [[nodiscard]] RayHit first_along(const Point3& from, const Vec3d& direction, double least,
+                                     double most) const;
     /// Whether an overhang lies straight above, below a height.
     [[nodiscard]] bool overhung(const Point3& from, double top) const;
 

@@ -70,6 +70,8 @@ const numbers = text => text.split(',').map(Number);
     check.that('data: steps are the build time', Math.abs(steps - plan.totals.build_minutes) < 0.02 * plan.totals.build_minutes, `${steps} ${plan.totals.build_minutes}`);
     check.equal('tables: rows', [await page.locator('#layers tbody tr').count(), await page.locator('#operations tbody tr').count(), await page.locator('#tools tbody tr').count()],
         [layers, plan.totals.operations, plan.tools.length]);
+    check.equal('tables: draft and draw', await page.locator('#draw tbody tr').count(),
+        ['little_draft', 'undercut_to_draw', 'thin_walls', 'inner_corners'].reduce((sum, kind) => sum + data.draw[kind].largest.length, 0));
     check.that('data: forces along every program', data.engagement.length === plan.totals.operations && plan.layers.flatMap(layer => layer.operations).every((o, i) => data.engagement[i].file === o.file && (o.minutes < 1 || data.engagement[i].force_n.some(f => f > 0))));
     // A force along a roughing program stays near the plan's nominal heaviest cut: same model, depth and width from the stock.
     const operations = plan.layers.flatMap(layer => layer.operations);
@@ -193,14 +195,14 @@ const numbers = text => text.split(',').map(Number);
     const picture = async () => { await page.waitForTimeout(60); return (await page.locator('#canvas').screenshot()).toString('base64'); };
     await page.locator('#view').scrollIntoViewIfNeeded();
     const seen = new Set([await picture()]);
-    for (const mode of ['surfaces', 'slope', 'reach', 'left']) {
+    for (const mode of ['surfaces', 'slope', 'reach', 'left', 'draw']) {
         await change('#mode', mode);
         seen.add(await picture());
     }
     await change('#axis', 'y');
     seen.add(await picture());
     await change('#axis', 'none');
-    check.equal('view: six pictures', seen.size, 6);
+    check.equal('view: seven pictures', seen.size, 7);
 }
 
 // The layer stack from the other side: another silhouette, as wide as the pattern is there.

@@ -1,6 +1,7 @@
 // Tables that sort, lead to their place in the 3D view, and can be taken along as CSV.
 
 import {duration, figure, make, words} from './dom.js';
+import {drawPlaces, drawSums} from './draw.js';
 import {layerMinutes, operationName, operations, phases, plan, remarks, toolUse} from './report.js';
 
 // columns: {name, of: row => value, text: row => shown, numeric}
@@ -110,6 +111,10 @@ export function buildTables(section, show) {
             number('Holder, mm', r => r.tool.holder.diameter, 1), number('Programs', r => r.uses.length, 0), {...number('Minutes', r => r.minutes), text: r => duration(r.minutes)},
         ], toolUse(), r => r.uses.length ? {layer: r.uses[0].layer, operation: r.uses[0].index, text: `first use of T${r.tool.number}: ${operationName(r.uses[0])}`} : null, show),
         ...selectionTables(show),
+        sortable('draw', drawSums.length ? `Draft and draw (${drawSums.join('; ')})` : 'Draft and draw', [
+            text('Finding', r => r.kind), number('Area, mm²', r => r.area, 1), number('Length, mm', r => r.length, 1), text('Worst', r => r.worst),
+            number('x', r => r.where[0]), number('y', r => r.where[1]), number('z', r => r.where[2]),
+        ], drawPlaces, r => ({where: r.where, text: `${r.kind}, ${r.worst}`}), show),
         sortable('remarks', 'Remarks and findings', [
             text('Code', r => r.code), {...text('Severity', r => r.severity), tone: r => r.severity}, text('From', r => r.source), text('Message', r => r.message),
             number('x', r => r.where?.[0]), number('y', r => r.where?.[1]), number('z', r => r.where?.[2]),

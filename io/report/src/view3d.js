@@ -3,6 +3,7 @@
 import * as THREE from 'three';
 import {OrbitControls} from 'three/examples/jsm/controls/OrbitControls.js';
 import {bytesOf, figure, make} from './dom.js';
+import {drawColors, drawKinds} from './draw.js';
 import {keepOutsIn} from './drawing.js';
 import {pathOf} from './paths.js';
 import {data, featureKinds, flaskRings, featureRange, layerName, operationName, operations, plan, toolOf} from './report.js';
@@ -35,7 +36,7 @@ function readModel() {
         const n = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], length = Math.hypot(...n) || 1;
         for (let k = 0; k < 3; ++k) normals[3 * f + k] = n[k] / length;
     }
-    return {count, corners, normals, reach: bytesOf(model.reach), base: model.min[2]};
+    return {count, corners, normals, reach: bytesOf(model.reach), draw: bytesOf(model.draw), base: model.min[2]};
 }
 
 function surfaceOf(nz, low, base) {
@@ -429,7 +430,7 @@ class View {
     }
 
     color() {
-        const {mode} = this.state, {normals, corners, reach, base} = this.model, color = new THREE.Color(), {stock} = data;
+        const {mode} = this.state, {normals, corners, reach, draw, base} = this.model, color = new THREE.Color(), {stock} = data;
         const maps = mode === 'left' ? data.left_over.layers.map(bytesOf) : null;
         for (const [l, entry] of this.layers.entries()) {
             const to = entry.geometry.attributes.color;
@@ -438,6 +439,7 @@ class View {
                 if (mode === 'layers') color.set(layerColors[l % layerColors.length]);
                 else if (mode === 'surfaces') color.set(surfaces[surfaceOf(nz, Math.min(corners[c + 2], corners[c + 5], corners[c + 8]), base)].color);
                 else if (mode === 'slope') nz < -1e-3 ? color.set('#8b8b8b') : rampColor(slopeRamp, Math.acos(Math.min(1, nz)) / (Math.PI / 2), color);
+                else if (mode === 'draw') color.set(drawColors[draw[f]]);
                 else if (mode === 'reach') color.set(['#b9bdc0', '#6fae8a', '#d6453d'][reach[f]]);
                 else {
                     const x = (corners[c] + corners[c + 3] + corners[c + 6]) / 3, y = (corners[c + 1] + corners[c + 4] + corners[c + 7]) / 3;
@@ -467,6 +469,7 @@ class View {
             slope: () => [bar(slopeRamp, '0° flat', '90° upright'), list([{name: 'faces down', color: '#8b8b8b'}])],
             reach: () => [list([{name: 'a tool reaches it', color: '#6fae8a'}, {name: 'no flat or ball end mill found that does', color: '#d6453d'}, {name: 'faces down', color: '#b9bdc0'}]),
                 make('p', {class: 'note'}, `Asked ${figure(data.model.reach_mm, 2)} mm off the surface, once in each cell of ${figure(data.model.reach_cell_mm, 1)} mm for each way it faces, in its own layer, holder included.`)],
+            draw: () => list(['draws well', ...drawKinds.slice(0, 3).map(kind => kind.title)].map((name, i) => ({name, color: drawColors[i]}))),
             left: () => [bar(leftRamp, '0', `${figure(this.leftTop(), 2)} mm and more`), list([{name: 'cut into the part', color: '#3557d6'}, {name: 'faces down, steeper than 80° or flask', color: '#b9bdc0'}]),
                 make('p', {class: 'note'}, `After all programs, from a stock with ${figure(data.stock.cell_mm, 2)} mm between its points; verify.json measures finer.`)],
         }[this.state.shape === 'built' ? 'wood' : this.state.mode]();
@@ -497,7 +500,7 @@ class View {
         this.axisSelect = axisSelect;
         const [section, sectionSlider] = slider('at', {id: 'section', value: 0.5, disabled: true}, value => { this.state.section = value; this.place(); });
         this.sectionReadout = make('output');
-        const [mode, modeSelect] = choice('Colour by', 'mode', [['layers', 'layer'], ['surfaces', 'features and undercuts'], ['slope', 'slope (α)'], ['reach', 'accessibility'], ['left', 'left-over']], value => { this.state.mode = value; this.color(); });
+        const [mode, modeSelect] = choice('Colour by', 'mode', [['layers', 'layer'], ['surfaces', 'features and undercuts'], ['slope', 'slope (α)'], ['reach', 'accessibility'], ['left', 'left-over'], ['draw', 'draft and draw']], value => { this.state.mode = value; this.color(); });
         this.modeSelect = modeSelect;
         const [shape, shapeSelect] = choice('Shape', 'shape', [['pattern', 'pattern as drawn'], ['built', 'wood as cut']], value => {
             this.state.shape = value;

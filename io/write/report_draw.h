@@ -1,0 +1,18 @@
+// Which facets of the report's picture keep the pattern from being drawn.
+#pragma once
+
+#include <string>
+
+#include "kernels/features/draw.h"
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+
+namespace slabwright {
+
+/// For every facet of the picture what the facet of the pattern is that lies nearest to its middle: 0 nothing
+/// of it, 1 little draft, 2 undercut to the draw, 3 a thin wall.
+/// @param report of the mesh @param model of the mesh, decimated
+[[nodiscard]] std::string draw_codes(Context& context, MeshView mesh, const DrawReport& report,
+                                     MeshView model);
+
+}  // namespace slabwright
