@@ -118,7 +118,7 @@ expect("kernels/area.cpp:6\t- to +\treturn a - 7;\tkilled" in again, f"a listed 
 expect(again.rstrip().splitlines()[-1] == "killed 1 of 2 (50.0 %)", f"the sum of those again\n{again}")
 (root / "kernels/area.cpp").write_text(before + "// newer\n")
 stale = subprocess.run([str(script), "--root", str(root), "--build", str(root / "build")], capture_output=True, text=True)
-expect(stale.returncode == 2 and "not up to date" in stale.stderr, f"a build that is behind: {stale.returncode} {stale.stderr}")
+expect(stale.returncode == 2 and "are not up to date" in stale.stderr, f"a build that is behind: {stale.returncode} {stale.stderr}")
 
 # ---- The kept list: each row is read, and has a verdict
 kept = source / "tests/mutants/survivors.tsv"
