@@ -116,9 +116,9 @@ again = run("--again", "--work", str(root / "again"))
 expect("kernels/area.cpp:6\t7 to 8\treturn a - 7;\tsurvived\t1 tests: area_test" in again, f"a change that nothing looks at\n{again}")
 expect("kernels/area.cpp:6\t- to +\treturn a - 7;\tkilled" in again, f"a listed change that a test notices\n{again}")
 expect(again.rstrip().splitlines()[-1] == "killed 1 of 2 (50.0 %)", f"the sum of those again\n{again}")
-(root / "kernels/area.cpp").write_text(before + "// newer\n")
-stale = subprocess.run([str(script), "--root", str(root), "--build", str(root / "build")], capture_output=True, text=True)
-expect(stale.returncode == 2 and "are not up to date" in stale.stderr, f"a build that is behind: {stale.returncode} {stale.stderr}")
+(root / "kernels/area.cpp").write_text(before + "int broken(\n")
+broken = subprocess.run([str(script), "--root", str(root), "--build", str(root / "build")], capture_output=True, text=True)
+expect(broken.returncode == 2 and "do not build" in broken.stderr, f"code that does not build: {broken.returncode} {broken.stderr}")
 
 # ---- The kept list: each row is read, and has a verdict
 kept = source / "tests/mutants/survivors.tsv"
