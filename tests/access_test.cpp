@@ -688,6 +688,58 @@ TEST(StandingPart, EnvelopeByGridOfFacetsThatDoNotClose) {
     }
 }
 
+// How far points are from facets, from the shadow and, horizontally, from what stands higher, against samples
+// of the surface, which can only be farther, and by no more than half of their step.
+TEST(StandingPart, DistancesAgreeWithBruteForceOnARelief) {
+    Context context;
+    const Mesh m = relief(8, bumpy);
+    const StandingPart part(context, m.view());
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> u(-3, 11), uz(-1, 12);
+    constexpr double step = 0.08, miss = 0.6 * step + 2 * StandingPart::kSheet, limit = 2.5;
+    const auto away = [](const Point3& p, const Point3& q) {
+        return std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+    };
+    for (const double z_top : {100.0, 6.5}) {
+        const std::vector<Point3> all = surface_points(m, 100, step);
+        std::vector<Point3> cap;
+        for (double x = 0; z_top < 10 && x <= 8; x += step)
+            for (double y = 0; y <= 8; y += step)
+                if (part.covered(x, y, z_top - StandingPart::kSheet)) cap.push_back({x, y, z_top});
+        for (int trial = 0; trial < 80; ++trial) {
+            const Point3 p{u(random), u(random), uz(random)};
+            double facets = limit, shadow = limit, beside = limit;
+            for (const Point3& q : all) {
+                facets = std::min(facets, away(p, q));
+                if (q[2] > z_top) continue;
+                shadow = std::min(shadow, away(p, {q[0], q[1], std::min(p[2], q[2])}));
+                if (q[2] > p[2] + 1e-9) beside = std::min(beside, std::hypot(p[0] - q[0], p[1] - q[1]));
+            }
+            for (const Point3& q : cap) {
+                shadow = std::min(shadow, away(p, {q[0], q[1], std::min(p[2], q[2])}));
+                if (p[2] < z_top) beside = std::min(beside, std::hypot(p[0] - q[0], p[1] - q[1]));
+            }
+            const double from_facets = part.from_facets(p, limit);
+            EXPECT_LE(from_facets, facets + 1e-9) << trial;
+            EXPECT_GE(from_facets, facets - miss) << trial;
+            // Of what is near enough any facet will do.
+            EXPECT_LE(part.from_facets(p, limit, 1), std::max(1.0, from_facets) + 1e-9) << trial;
+            EXPECT_GE(part.from_facets(p, limit, 1), from_facets - 1e-9) << trial;
+            const StandingPart::Clearance over = part.from_shadow(p, z_top, limit);
+            EXPECT_LE(over.distance, shadow + 2 * StandingPart::kSheet) << trial;
+            EXPECT_GE(over.distance, shadow - miss) << trial;
+            if (over.distance > 0 && over.distance < limit) {
+                EXPECT_NEAR(std::hypot(over.away[0], over.away[1], over.away[2]), over.distance, 1e-6)
+                    << trial;
+            }
+            const StandingPart::Clearance aside = part.beside(p, z_top, limit);
+            EXPECT_LE(aside.distance, beside + 2 * StandingPart::kSheet) << trial;
+            // Where a slope ends at the height asked for, samples that stand higher begin a step farther off.
+            EXPECT_GE(aside.distance, beside - 4 * miss) << trial;
+        }
+    }
+}
+
 TEST(StandingPart, DistanceFromShadow) {
     Context context;
     Mesh m;

@@ -94,6 +94,25 @@ TEST(Accessibility, OfABlockIsWhole) {
     }
 }
 
+// By facet: its share, and −1 for what is no wall of the layer.
+TEST(Accessibility, SharesAreOneOnWallsAndMinusOneElsewhere) {
+    Context context;
+    const Mesh mesh = weld(context, shapes::box({0, 0, 0}, {20, 10, 12}));
+    const AccessScene scene(context, mesh.view());
+    AccessOptions options;
+    options.shares = true;
+    for (const double z_top : {12.0, 5.0}) {
+        const Accessibility a = scene.accessible(context, 0, z_top, flat(3), options);
+        ASSERT_EQ(a.share.size(), mesh.facets.size());
+        for (std::size_t f = 0; f < mesh.facets.size(); ++f) {
+            const Index3& corners = mesh.facets[f];
+            const float z = mesh.vertices[corners[0]].z;
+            const bool level = z == mesh.vertices[corners[1]].z && z == mesh.vertices[corners[2]].z;
+            EXPECT_EQ(a.share[f], level ? -1.0F : 1.0F) << f;
+        }
+    }
+}
+
 // A slot: a flat end mill enters it if it is not wider by more than the tolerance on either side.
 TEST(Accessibility, OfASlotByWidth) {
     Context context;

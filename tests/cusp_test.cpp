@@ -75,7 +75,7 @@ TEST(Cusp, StepdownIsTheInverse) {
 }
 
 // LUO's table: R .125 in, 87°, L .002 in gives .0445 in; the true limit is .0636 in, 30 % fewer passes.
-// (METHOD.md says .0639, which leaves .00201 in by its own formula and by the sampled profiles alike.)
+// (.0639 leaves .00201 in, by the formula and by the sampled profiles alike.)
 TEST(Cusp, LuoStepdowns) {
     EXPECT_NEAR(ball_level_stepdown_printed(0.125, 87 * kDegree, 0.002), 0.04448, 5e-6);
     EXPECT_NEAR(ball_level_stepdown(0.125, 87 * kDegree, 0.002), 0.0636, 5e-5);

@@ -507,10 +507,13 @@ TEST(LayerSolid, CornersHoldTheNormalsAroundThem) {
     std::mt19937 random(test::seed());
     Context context;
     std::size_t known = 0, known_aside = 0;
-    for (int trial = 0; trial < 6; ++trial) {
-        const Mesh mesh = test::random_height_field(context, 12, 2.0, 5, trial % 2 ? 0.5 : 2.0,
-                                                    static_cast<std::uint32_t>(random()));
-        const LayerSolid solid = layer_solid(context, mesh.view(), -5, trial < 4 ? 100 : 2.5);
+    for (int trial = 0; trial < 8; ++trial) {
+        // The ring is cut off where it overhangs: between its normals and upright lie those that are level.
+        const bool ring = trial >= 6;
+        const Mesh mesh = ring ? weld(context, shapes::torus(trial == 6 ? 12 : 30, 30, 10))
+                               : test::random_height_field(context, 12, 2.0, 5, trial % 2 ? 0.5 : 2.0,
+                                                           static_cast<std::uint32_t>(random()));
+        const LayerSolid solid = layer_solid(context, mesh.view(), -50, trial < 4 ? 100 : ring ? -4 : 2.5);
         std::map<Vec3d, std::vector<const SolidFacet*>> around;
         for (const SolidFacet& f : solid.facets)
             for (const Vec3d& p : f.p) around[p].push_back(&f);

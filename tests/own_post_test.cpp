@@ -490,9 +490,11 @@ TEST(OwnPost, OtherWaysOfSayingItAreTaken) {
 }
 
 TEST(OwnPost, LinesThatMoveOrChangeWhatTheProofReliesOnAreRefusedByName) {
-    for (const char* line : {"G0 X0 Y0", "G1 Z5", "G28", "G30",   "G53 G0 Z0",    "X5",        "G91",
-                             "G20",      "G21",   "G55", "G59.3", "G10 L2 P1 X0", "G52 X1",    "G92 X0",
-                             "G43.1 Z1", "M0",    "M1",  "M4",    "M8",           "M98 P1000", "G90.1"})
+    for (const char* line :
+         {"G0 X0 Y0", "G1 Z5", "G2 X0 I1", "G3 X0 I1",     "G28",    "G30",       "G53 G0 Z0", "X5",
+          "G91",      "G20",   "G21",      "G55",          "G56",    "G57",       "G58",       "G59",
+          "G59.1",    "G59.2", "G59.3",    "G10 L2 P1 X0", "G52 X1", "G92 X0",    "G43.1 Z1",  "M0",
+          "M1",       "M4",    "M7",       "M8",           "M60",    "M98 P1000", "M99",       "G90.1"})
         for (const char* part : {"program]\nend", "program]\nbegin", "program]\nchange", "extra]\nstart"}) {
             const std::string text = based_on("linuxcnc", fmt::format("[{} = [\n  \"{}\"]\n", part, line));
             const std::string found = refusal(text);

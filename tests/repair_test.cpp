@@ -465,6 +465,23 @@ TEST(Repair, WindingNumberIsThatOfTheSum) {
     }
 }
 
+// Through each facet the winding number falls by one, outwards.
+TEST(Repair, WindingNumberFallsByOneThroughEachFacet) {
+    const Mesh mesh = welded(sound());
+    Context context({.threads = 2});
+    const WindingTree tree(context, mesh.vertices, mesh.facets);
+    for (std::size_t f = 0; f < mesh.facets.size(); ++f) {
+        std::array<Xyz, 3> at;
+        for (std::size_t k = 0; k < 3; ++k) at[k] = xyz(mesh.vertices[mesh.facets[f][k]]);
+        Xyz middle{};
+        for (const Xyz& corner : at) middle = plus(middle, corner, 1.0 / 3);
+        const Xyz outward = twice_area(at[0], at[1], at[2]);
+        const double beside = 1e-3 / length(outward);
+        EXPECT_NEAR(tree.at(plus(middle, outward, -beside)) - tree.at(plus(middle, outward, beside)), 1, .1)
+            << f;
+    }
+}
+
 TEST(Repair, LeastAreaAndEarsCoverARegion) {
     Random random(test::seed());
     for (int round = 0; round < 200; ++round) {

@@ -146,6 +146,26 @@ TEST(FacetRoles, AreWhatWindingNumbersSayOfFolds) {
         expect_roles(context, folded(shapes::torus(12, 30, 10), 0.15, 12, random), random, trial);
 }
 
+// Two facets on one edge that are folded onto one another are told whichever corners they are given from: here
+// the four of a tetrahedron pressed flat, whose volume is nothing.
+TEST(FacetRoles, TellFoldsFromWhicheverCorner) {
+    Context context;
+    const Vec3f a{0, 0, 5}, b{10, 0, 5}, c{5, 8, 5}, d{5, 3, 5};
+    const std::array<std::array<Vec3f, 3>, 4> flat{{{a, c, b}, {a, b, d}, {b, c, d}, {c, a, d}}};
+    for (unsigned turns = 0; turns < 81; ++turns) {
+        shapes::Facets facets = shapes::box({20, 0, 0}, {30, 10, 10});
+        unsigned rest = turns;
+        for (std::array<Vec3f, 3> facet : flat) {
+            std::rotate(facet.begin(), facet.begin() + rest % 3, facet.end());
+            facets.push_back(facet);
+            rest /= 3;
+        }
+        const Mesh mesh = solid_of(context, facets);
+        ASSERT_EQ(mesh.facets.size(), 16U);
+        EXPECT_EQ(count(mesh, FacetRole::unsure), 4U) << turns;
+    }
+}
+
 TEST(Windings, AreThoseOfAngles) {
     Context context;
     std::mt19937 random(test::seed());

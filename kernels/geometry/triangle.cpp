@@ -60,20 +60,21 @@ double squared_distance(const Point3& p, const Triangle& t, Point3& q) {
              t[0][2] + v * ab[2] + w * ac[2]};
         return squared_distance(p, q);
     };
+    // Of an edge without length both ends are as far along: no share of it is asked for.
     const double d1 = dot(ab, ap), d2 = dot(ac, ap);
     if (d1 <= 0 && d2 <= 0) return from(0, 0);
     const Point3 bp = minus(p, t[1]);
     const double d3 = dot(ab, bp), d4 = dot(ac, bp);
     if (d3 >= 0 && d4 <= d3) return from(1, 0);
     const double vc = d1 * d4 - d3 * d2;
-    if (vc <= 0 && d1 >= 0 && d3 <= 0) return from(d1 / (d1 - d3), 0);
+    if (vc <= 0 && d1 >= 0 && d3 <= 0 && d1 > d3) return from(d1 / (d1 - d3), 0);
     const Point3 cp = minus(p, t[2]);
     const double d5 = dot(ab, cp), d6 = dot(ac, cp);
     if (d6 >= 0 && d5 <= d6) return from(0, 1);
     const double vb = d5 * d2 - d1 * d6;
-    if (vb <= 0 && d2 >= 0 && d6 <= 0) return from(0, d2 / (d2 - d6));
+    if (vb <= 0 && d2 >= 0 && d6 <= 0 && d2 > d6) return from(0, d2 / (d2 - d6));
     const double va = d3 * d6 - d5 * d4;
-    if (va <= 0 && d4 >= d3 && d5 >= d6) {
+    if (va <= 0 && d4 >= d3 && d5 >= d6 && (d4 > d3 || d5 > d6)) {
         const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
         return from(1 - w, w);
     }

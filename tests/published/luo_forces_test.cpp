@@ -7,14 +7,17 @@
 #include <cmath>
 #include <cstdio>
 #include <initializer_list>
+#include <numbers>
+#include <vector>
 
+#include "engine/tools/libraries.h"
 #include "kernels/forces/deflection.h"
 #include "kernels/forces/forces.h"
 
 namespace slabwright {
 namespace {
 
-constexpr double kInch = 25.4, kPi = std::numbers::pi;
+constexpr double kPi = std::numbers::pi;
 constexpr OrthogonalForces kDippon{8.8575, 1.1268, 0.6188, 2.4948};  // MDF; tc, te, fc, fe
 
 void row(const char* what, double published, double computed, const char* why) {
@@ -46,33 +49,30 @@ OverhangCut specimen(double fx, double fy, double fz) {
     return c;
 }
 
-// What 6.5.1 to 6.5.3 set down as given: what of it the model takes, and as what.
+// What 6.5.1 to 6.5.3 set down as given and the model supplies by itself. The rest of it is what slot() and
+// specimen() say above.
 TEST(LuoForces, Given) {
-    const CutSegment s = slot(kPi / 6, CoefficientTransform::printed);
-    const OverhangCut c = specimen(0, 0, 0);
-    std::printf("LUO 6.5, given                     published       used   why they differ\n");
-    row("rake angle, degrees", "15", std::nan(""), "not used: it is in the orthogonal data already");
-    row("helix angle, degrees", 30, s.helix_rad * 180 / kPi, "");
-    row("spindle speed, 1/min", 4000, s.spindle_rpm, "for power only");
-    row("cutting depth a, mm", 3, s.high_mm, "");
-    row("feed per tooth c, mm", 0.635, s.chip_load_mm, "");
-    row("Ktc, N/mm2 (Dippon)", 8.8575, kDippon.ktc, "");
-    row("Kte, N/mm", 1.1268, kDippon.kte, "");
-    row("Kfc, N/mm2", 0.6188, kDippon.kfc, "");
-    row("Kfe, N/mm", 2.4948, kDippon.kfe, "");
-    row("flutes", 2, s.flutes, "");
-    row("cutter diameter, in", "-", 2 * s.radius_mm / kInch,
-        "print does not say; 1/2 in is the set's roughing tool");
-    row("specimen: strength, MPa", 27, c.strength_mpa, "");
-    row("  depth of cut d, in", 0.12, s.high_mm / kInch, "the forces are those of 3 mm, .118 in");
-    row("  overhang b, in", 2, c.overhang_mm / kInch, "");
-    row("  width R, in", 0.5, c.width_mm / kInch, "");
-    row("  cutting height a, in", 0.06, c.cut_height_mm / kInch, "half of the depth");
-    row("E, GPa", 200, kToolModulusMpa / 1000, "");
-    row("allowed deflection, in", 0.002, 0.002, "print gives no unit; its lengths are in inches");
-    row("table 6.2, diameters, in", "5", 5, ".125 to 1: the library of table 5.4");
-    EXPECT_EQ(kToolModulusMpa, 200e3);
-    EXPECT_EQ(c.cut_height_mm, 0.06 * kInch);
+    EXPECT_EQ(CutSegment{}.flutes, 2);
+    // E of 200 GPa, on a cylinder as thin as the flutes leave it: 2 N per µm for a 10 mm cutter 50 mm long.
+    const double inertia_mm4 = kPi / 64 * 8 * 8 * 8 * 8;
+    EXPECT_NEAR(cutter_deflection(100, 50, 10), 100 * 125e3 / (3 * 200e3 * inertia_mm4), 1e-12);
+    // The spindle's 4000 / min count for power only, and there in proportion.
+    CutSegment s = slot(kPi / 6, CoefficientTransform::printed);
+    const SegmentForces slow = closed_form_forces(s);
+    s.spindle_rpm = 8000;
+    const SegmentForces fast = closed_form_forces(s);
+    EXPECT_EQ(slow.peak_x_n, fast.peak_x_n);
+    EXPECT_EQ(slow.peak_z_n, fast.peak_z_n);
+    EXPECT_EQ(slow.mean_torque_nmm, fast.mean_torque_nmm);
+    EXPECT_NEAR(slow.mean_power_w, slow.mean_torque_nmm / 1000 * 4000 / 60 * 2 * kPi, 1e-9);
+    EXPECT_NEAR(fast.mean_power_w, 2 * slow.mean_power_w, 1e-9);
+    // Table 6.2 is table 5.4's five diameters, of flats and of balls.
+    for (const ToolKind kind : {ToolKind::flat, ToolKind::ball}) {
+        std::vector<long> thousandths;
+        for (const Tool& tool : luo_library())
+            if (tool.kind == kind) thousandths.push_back(std::lround(1000 * tool.diameter / kInch));
+        EXPECT_EQ(thousandths, (std::vector<long>{125, 250, 500, 750, 1000}));
+    }
 }
 
 TEST(LuoForces, Coefficients) {

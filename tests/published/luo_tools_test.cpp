@@ -21,7 +21,7 @@ namespace {
 // Where AR comes from: print's own tables 5.5 and 5.6, or their rule applied to this part.
 enum class Source { tables, printed };
 
-class LuoTools : public testing::TestWithParam<Source> {
+class LuoSample : public testing::Test {
 protected:
     Context context;
     Mesh mesh = weld(context, luo_tool_sample());
@@ -38,17 +38,25 @@ protected:
         };
     }
 
-    ToolChoice choose(double z_bottom_in, double z_top_in) {
+    /// The choice by the shares that `ratio` gives, or by those that print's rule gives for this part.
+    ToolChoice choose(double z_bottom_in, double z_top_in, const ReachRatio& ratio) {
         const LayerJob layer = luo_layer(mesh, job, features, z_bottom_in, z_top_in);
-        ToolChoice choice = select_tools(
-            context, layer,
-            GetParam() == Source::tables ? tables(z_bottom_in) : reach_ratio(context, layer, nullptr));
+        ToolChoice choice =
+            select_tools(context, layer, ratio ? ratio : reach_ratio(context, layer, nullptr));
         for (const ToolCandidate& c : choice.record.candidates)
             std::printf("%-10s %-4s T%-2d AR %.4f AS %6.1f mm2 stepdown %.4f in %6.2f min: %s\n",
                         c.purpose.c_str(), c.chosen ? "yes" : "no", c.tool, c.accessibility.value_or(NAN),
                         c.semi_rough_mm2.value_or(NAN), c.stepdown.value_or(NAN) / kInch,
                         c.minutes.value_or(NAN), c.reason.c_str());
         return choice;
+    }
+};
+
+class LuoTools : public LuoSample, public testing::WithParamInterface<Source> {
+protected:
+    ToolChoice choose(double z_bottom_in, double z_top_in) {
+        return LuoSample::choose(z_bottom_in, z_top_in,
+                                 GetParam() == Source::tables ? tables(z_bottom_in) : ReachRatio{});
     }
 };
 
@@ -71,7 +79,7 @@ TEST_P(LuoTools, SecondLayer) {
     EXPECT_NEAR(choice.tools.rough.stepdown_max, 0.15 * kInch, 1e-9);
     EXPECT_TRUE(choice.tools.semi_rough.empty());
     EXPECT_NEAR(choice.record.finish_stepdown_printed, 0.0445 * kInch, 0.0001 * kInch);
-    EXPECT_NEAR(choice.record.finish_stepdown, 0.0639 * kInch, 0.0005 * kInch)
+    EXPECT_NEAR(choice.record.finish_stepdown, 0.06362 * kInch, 0.0001 * kInch)
         << "the same cusp, by the true limit";
     EXPECT_NEAR(choice.record.rough_stepdown, 0.191 * kInch, 0.001 * kInch);
 }
@@ -86,6 +94,37 @@ TEST_P(LuoTools, ThirdLayer) {
     EXPECT_NEAR(choice.tools.rough.diameter, 0.5 * kInch, 1e-9);
     EXPECT_NEAR(choice.tools.rough.stepdown_max, 0.15 * kInch, 1e-9);
     EXPECT_NEAR(choice.record.rough_stepdown, 0.191 * kInch, 0.001 * kInch);
+}
+
+// Print's shares go in above, so that its choices come out as long as the rule is print's: the first size,
+// from the largest down, that reaches 97.5 %. Shares a little over and under it show that the rule is what
+// decides.
+TEST_F(LuoSample, TheFirstSizeOverTheThresholdIsTaken) {
+    const auto finish_with = [&](double changed_in, double share) {
+        const ReachRatio printed = tables(0.75);
+        const ToolChoice choice = choose(0.75, 1.5, [&](const Tool& tool) {
+            return std::abs(tool.diameter - changed_in * kInch) < 1e-9 ? share : printed(tool);
+        });
+        int asked = 0;
+        for (const ToolCandidate& c : choice.record.candidates) {
+            if (c.purpose != "finish") continue;
+            ++asked;
+            const bool last = c.tool == choice.tools.finish.number;
+            EXPECT_EQ(c.chosen, last) << "T" << c.tool;
+            EXPECT_EQ(c.accessibility.value_or(0) >= 0.975, c.chosen) << "T" << c.tool;
+        }
+        return std::pair{choice.tools.finish.diameter / kInch, asked};
+    };
+    const auto expect = [&](double changed_in, double share, double diameter_in, int asked) {
+        const auto [diameter, sizes] = finish_with(changed_in, share);
+        EXPECT_NEAR(diameter, diameter_in, 1e-9) << changed_in << " in at " << share;
+        EXPECT_EQ(sizes, asked) << changed_in << " in at " << share;
+    };
+    expect(0.75, 0.9751, 0.75, 2);
+    expect(0.75, 0.975, 0.75, 2);
+    expect(0.75, 0.9749, 0.25, 4);
+    expect(0.5, 0.9751, 0.5, 3);
+    expect(0.25, 0.9749, 0.125, 5);
 }
 
 INSTANTIATE_TEST_SUITE_P(Accessibility, LuoTools, testing::Values(Source::tables, Source::printed),
