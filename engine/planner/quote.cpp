@@ -26,13 +26,13 @@ constexpr double kBeside = 0.05;  // mm from a layer's ends to where it is cut b
 constexpr double kUpright = 89.5, kLevel = 0.5, kSteep = 45;  // degrees
 
 /// What milling takes over its ways at full feed, and minutes of a place in a layer: fitted to the programs
-/// of castings (bench/quote), least squares of relative errors, weighted by one over the root of each.
+/// of castings (bench/quote), least squares of relative errors, those over a quarter weighing less.
 /// Walls and floors are small beside these and go with the places.
 struct Rates {
-    double facing = 4.567, roughing = 0.53, contours = 2.502, raster = 3.342;
-    double place = 1.949;   // min
-    double turn = 0.01382;  // min a radian: machines slow down where an outline turns
-    double thin = 52.23;    // min/min: where wood is thin, feeds are low and passes many
+    double facing = 3.745, roughing = 0.571, contours = 2.056, raster = 3.084;
+    double place = 3.359;   // min
+    double turn = 0.03389;  // min a radian: machines slow down where an outline turns
+    double thin = 48.22;    // min/min: where wood is thin, feeds are low and passes many
 };
 constexpr Rates kRates{};
 constexpr double kSmallPlace = 150;  // mm: a loop so long counts as half a place
