@@ -39,7 +39,7 @@ TEST(BothSides, ABoundaryForEachTunnel) {
     const auto place = [&](const std::vector<support::Tunnel>& tunnels) {
         const Mesh block = weld(context, block_with_tunnels({0, 0, 0}, {60, 20, 60}, tunnels));
         const AirGaps gaps = air_gaps(context, block.view(), 0.1);
-        const std::vector<double> tops = tops_of(place_layers_both_sides(request(60, 60, 3), gaps));
+        std::vector<double> tops = tops_of(place_layers_both_sides(request(60, 60, 3), gaps));
         EXPECT_LT(unmade_air(context, gaps, tops, MilledFrom::both_sides).volume_mm3, 1);
         return tops;
     };

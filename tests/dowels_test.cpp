@@ -207,6 +207,15 @@ TEST(Dowels, AJointWithoutAPlaceIsToldOrRefused) {
     EXPECT_EQ(codes_of(planned(thin, {30, 60}, {.per_joint = 2})), Codes{"dowel.none"});
     EXPECT_EQ(codes_of(planned(thin, {30, 60}, {.per_joint = 2, .clearance = 8})), Codes{});
     EXPECT_EQ(codes_of(planned(small, {30, 60}, {.per_joint = 2})), Codes{"dowel.few"});
+    // Of two dowels one has room, about which the slab turns; of four two have, which hold it.
+    const auto says = [&](const Hollowed& part, JointDowels rules) {
+        return planned(part, {30, 60}, rules).diagnostics.at(0).message;
+    };
+    EXPECT_NE(says(small, {.per_joint = 2}).find("or lay the slab by its edges"), std::string::npos);
+    const Hollowed wide{{{0, 0, 0}, {70, 35, 60}}, {}};
+    EXPECT_NE(says(wide, {.per_joint = 4}).find("room for 2 of 4"), std::string::npos)
+        << says(wide, {.per_joint = 4});
+    EXPECT_EQ(says(wide, {.per_joint = 4}).find("or lay the slab by its edges"), std::string::npos);
     EXPECT_EQ(codes_of(planned(thin, {8, 60}, {.per_joint = 2, .clearance = 8})), Codes{"dowel.none"});
     EXPECT_EQ(codes_of(planned(thin, {8, 60}, {.clearance = 8})), Codes{});
     try {

@@ -33,7 +33,7 @@ CommandResult slabwright_command(std::vector<std::string> arguments) {
 std::string tunnelled(const TemporaryFolder& folder) {
     using namespace slabwright;
     Context context({.threads = 1});
-    const std::string stl = folder / "block.stl";
+    std::string stl = folder / "block.stl";
     write_stl(stl, weld(context, support::block_with_tunnels({0, 0, 0}, {80, 40, 60}, {{40, 30, 12}})));
     return stl;
 }

@@ -136,6 +136,35 @@ TEST(Layers, ARegionTallerThanALayerIsCrossedByFewestBoundariesThenLargestQ) {
     EXPECT_TRUE(has(p, "layers.type1"));
 }
 
+// Where no boundary is due soon after such a region, boundaries lead to its upper end, each 5 mm under a
+// flat, so that no more layers than need be lead on to the top.
+TEST(Layers, ARegionTallerThanALayerIsCrossedToItsEndWhereTheTopIsFar) {
+    for (const double height : {95.0, 110.0, 120.0, 131.0}) {
+        std::vector<Feature> features;
+        for (int z = 10; z <= 50; z += 4) features.push_back(level(FeatureType::up_flat, z));
+        const LayerPlacement p = place_layers_printed(request(height, features));
+        std::size_t inside = 0;
+        double below = 0;
+        for (const Boundary& b : p.boundaries) {
+            EXPECT_LE(b.z - below, 18.5 + 1e-6) << height;
+            below = b.z;
+            if (b.z > 49.9) continue;
+            ++inside;
+            EXPECT_NEAR(std::remainder(b.z - 5, 4), 0, 1e-6) << b.z << " of " << height;
+        }
+        EXPECT_GE(inside, 3U) << "5 and two more: from 31.5 mm on a layer comes out of the region";
+        // The fewest: from 5 by way of an end e of the region as many layers as it takes to the top.
+        std::size_t fewest = 1000;
+        for (double e = 33; e < 50; e += 4) {
+            const auto steps = [](double way, double step) {
+                return static_cast<std::size_t>(std::ceil(way / step - 1e-9));
+            };
+            fewest = std::min(fewest, 1 + steps(e - 5, 16) + steps(height - e, 18.5));
+        }
+        EXPECT_EQ(p.boundaries.size(), fewest) << height;
+    }
+}
+
 TEST(Layers, PrintedTallRegionsMatchBruteForce) {
     const unsigned seed = test::seed();
     SCOPED_TRACE("seed " + std::to_string(seed));

@@ -120,6 +120,22 @@ Plan hand_made() {
 
 }  // namespace
 
+// What a terminal could obey, and what is no UTF-8, is not shown.
+TEST(JsonText, PrintableTextHasNoControlsAndIsUtf8) {
+    EXPECT_EQ(printable("a\x01"
+                        "b\x1B[31m\x7F\tz",
+                        true),
+              "a b [31m  z");
+    EXPECT_EQ(printable("\xC2\x85|\xC2\x9F|\xC2\xA0|\xC3\xA4|\xE2\x82\xAC|\xF0\x9F\x98\x80", true),
+              " | |\xC2\xA0|\xC3\xA4|\xE2\x82\xAC|\xF0\x9F\x98\x80");
+    EXPECT_EQ(printable("\xFF|\xC3|\x80|\xC0\xAF|\xE0\x80\x80|\xED\xA0\x80|\xF4\x90\x80\x80", true),
+              "?|?|?|??|???|???|????");
+    EXPECT_EQ(printable("a\nb", true), "a b");
+    EXPECT_EQ(printable("a\nb\r", false), "a\nb ");
+    EXPECT_EQ(quoting_line(std::string(400, 'x')), std::string(400, 'x'));
+    EXPECT_EQ(quoting_line(std::string(401, 'x')), std::string(400, 'x') + " …");
+}
+
 TEST(JsonText, NumbersHaveNoExponentAndReadBack) {
     const unsigned seed = test::seed();
     std::mt19937_64 random(seed);

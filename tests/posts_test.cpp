@@ -624,6 +624,8 @@ TEST(Posts, DamagedTextsAreTold) {
         {Post::heidenhain, "M30\n", "M5\n", "gcode.no_end"},
         {Post::heidenhain, "25 END PGM L002_01_rough_T2 MM\n", "", "gcode.no_end"},
         {Post::heidenhain, "END PGM L002", "END PGM L003", "gcode.no_end"},
+        {Post::heidenhain, "25 END PGM L002_01_rough_T2 MM\n", "25 END PGM L002_01_rough_T2 MM\n26 M5\n",
+         "gcode.after_end"},
     };
     std::map<Post, int> told;
     for (const Damage& d : damages) {

@@ -90,6 +90,34 @@ TEST(Quote, TakesTheThinnestSlabThatHoldsALayer) {
     EXPECT_NE(quote_text({{}, q}).find("1 of 19 x"), std::string::npos) << quote_text({{}, q});
 }
 
+// Every figure with as many digits as are told.
+TEST(Quote, IsWrittenToTheDigitsThatMeanSomething) {
+    QuotedModel model;
+    model.input.file = "part.stl";
+    Quote& q = model.quote;
+    q.outcome.layers = 3;
+    q.outcome.unmade_mm3 = 1.26;
+    q.stock = {120.12345, 80.98765};
+    q.slabs = {{19.123456, 3}};
+    q.slab_m2 = 0.123456, q.glue_m2 = 0.654321, q.mass_kg = 4.5678;
+    q.work = {{"rough", 1.23456, 2.34567}};
+    q.cutting_minutes = 10.26, q.bonding_minutes = 20.26, q.tool_change_minutes = 0.26,
+    q.build_minutes = 30.78;
+    q.spread = 0.2567;
+    const std::string text = quote_json(model);
+    std::string packed;
+    for (const char c : text)
+        if (c != ' ' && c != '\n') packed += c;
+    for (const char* part :
+         {"\"layers\":3,\"unmade_mm3\":1.3,", "\"stock\":[120.123,80.988]",
+          "{\"thickness\":19.1235,\"count\":3}", "\"slab_m2\":0.1235,\"glue_m2\":0.6543,\"mass_kg\":4.57,",
+          "{\"name\":\"rough\",\"ideal_minutes\":1.235,\"minutes\":2.35}",
+          "\"cutting_minutes\":10.3,\"bonding_minutes\":20.3,\"tool_change_minutes\":0.3,\"build_minutes\":"
+          "30.8,"
+          "\"spread\":0.26,\"boards\":0,\"bought_m2\":0,\"cost\":null"})
+        EXPECT_NE(packed.find(part), std::string::npos) << part << " in\n" << text;
+}
+
 TEST(Quote, RefusesWhatNoSlabHolds) {
     Context context;
     const support::TemporaryFolder folder;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <random>
 
 #include "engine/simulate/replay.h"
@@ -170,6 +171,10 @@ TEST(Report, HoldsWhatLiesInTheFolder) {
     EXPECT_TRUE(data["verify"].is_null());
     EXPECT_EQ(data["paths"]["programs"].size(), static_cast<std::size_t>(planned.totals.operations));
     EXPECT_EQ(data["outlines"]["layers"].size(), planned.layers.size());
+    // The half sphere's 2πr² and its base, over 2500 places.
+    const double radius = (planned.input.max[0] - planned.input.min[0]) / 2;
+    EXPECT_NEAR(data["model"]["reach_cell_mm"].get<double>(),
+                std::sqrt(3 * std::numbers::pi * radius * radius / 2500), 0.02);
     EXPECT_EQ(data["left_over"]["layers"].size(), planned.layers.size());
     // A dome draws well; each facet of its picture has a code that says so.
     EXPECT_EQ(data["draw"]["limits"]["draft_deg"], 1);

@@ -229,7 +229,9 @@ TEST(UnmadeAir, IsOffByLittleMoreThanItSays) {
                 std::sort(solid.begin(), solid.end());
                 double reached = solid[0][1];
                 for (const auto& [low, high] : solid) {
-                    const auto stabs = [&](double z) { return z >= reached && z <= low; };
+                    const auto stabs = [begin = reached, end = low](double z) {
+                        return z >= begin && z <= end;
+                    };
                     if (low > reached && !stabs(tops[0]) && !stabs(tops[1]))
                         expected += (low - reached) * cell * cell;
                     reached = std::max(reached, high);

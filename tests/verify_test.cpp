@@ -204,6 +204,8 @@ TEST(Verify, MapsShowEachLayer) {
     for (const CellKind k : l.kinds) missed += k == CellKind::missed;
     EXPECT_GT(missed, 0u);
     EXPECT_EQ(missed, l.missed);
+    const Verification bare = verify_folder(context, f.path.string(), {.source = {}, .cell = 0.5});
+    EXPECT_TRUE(bare.report.layers[0].map.empty()) << "nobody asked for maps";
     spill(f.path / "file", "");
     try {
         (void)verify_folder(context, f.path.string(),

@@ -18,6 +18,7 @@ namespace {
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kSameDraft = 0.01;  // degrees
 constexpr double kPoints = 500'000;  // of thickness, over the whole surface
+constexpr double kLeastWall = 0.1;   // mm²: what is smaller are slivers beside edges
 constexpr std::size_t kGrain = 8192;
 
 void check(const DrawLimits& limits) {
@@ -110,6 +111,7 @@ void find_thin(Context& context, MeshView mesh, DrawReport& report) {
         [&](std::uint32_t f) { return thin[of[f]].share * area_of(mesh, f); },
         [&](std::uint32_t f) { return static_cast<double>(thin[of[f]].thickness_mm); },
         [&](std::uint32_t f) { return thin[of[f]].at; });
+    std::erase_if(report.thin, [](const DrawPatch& p) { return p.area_mm2 < kLeastWall; });
     report.thin_mm2 = sum_of(report.thin);
 }
 

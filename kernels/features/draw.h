@@ -41,7 +41,7 @@ struct InnerCorner {
 
 struct DrawReport {
     DrawLimits limits;
-    /// The largest first. Of a thin wall both sides count.
+    /// The largest first. Of a thin wall both sides count; what is under .1 mm² is left out.
     std::vector<DrawPatch> little_draft, undercuts, thin;
     double little_draft_mm2 = 0, undercut_mm2 = 0, thin_mm2 = 0;
     std::vector<InnerCorner> corners;  ///< the longest first
