@@ -274,10 +274,9 @@ void draw_glue(const Json& sequence, Json& layers) {
     }
 }
 
-/// Sections at the layers' ends, glue, silhouettes, slopes, draft: what pictures are drawn from.
+/// Sections at the layers' ends, glue, silhouettes, slopes: what pictures are drawn from.
 void draw_figures(Context& context, MeshView mesh, const PlannedFolder& folder, const Json& sequence,
-                  Figures& figures) {
-    Json& data = figures.data;
+                  Json& data) {
     const SimulationInput& input = folder.simulation;
     const Box3 box = bounds(context, mesh);
     std::vector<Plane> planes;
@@ -319,10 +318,14 @@ void draw_figures(Context& context, MeshView mesh, const PlannedFolder& folder, 
                       {"area_mm2", std::move(areas)},
                       {"down_flat_mm2", rounded(slopes.down_flat_mm2, 1)},
                       {"undercut_mm2", rounded(slopes.undercut_mm2, 1)}};
-    figures.draw = check_draw(context, mesh);
+}
+
+/// What keeps the pattern from being drawn. It is looked for before all else, while memory is left.
+void check_draw_of(Context& context, MeshView mesh, Figures& figures) {
+    figures.draw = draw_within_memory(context, mesh);
     JsonText draw;
     put_draw(draw, figures.draw);
-    data["draw"] = Json::parse(draw.take());
+    figures.data["draw"] = Json::parse(draw.take());
 }
 
 /// The pattern for the 3D view: places as 16-bit shares of its box.
@@ -495,7 +498,6 @@ std::string report_html(Context& context, const std::string& directory, const Re
     if (verified) programs = std::move(verified->input.programs);
     verified.reset();
     const MeshView mesh = pattern->read.mesh.view();
-
     std::uint64_t moves = 0;
     for (const Program& program : programs) moves += program.steps.size();
     const ReportWork work = report_work(moves, mesh.facets.size());
@@ -504,6 +506,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
     Figures figures;
     figures.data = {
         {"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", plan}, {"verify", verify}};
+    check_draw_of(context, mesh, figures);
     const auto draw = [&] {
         Json& steps = figures.data["steps"] = Json::array();
         if (sequence.is_object())
@@ -511,7 +514,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
                 steps.push_back({step.at("layer").get<int>(), step.at("action").get<std::string>(),
                                  step.at("seconds").get<double>(),
                                  step.value("program", step["action"] == "load_tool" ? step : Json())});
-        draw_figures(context, mesh, folder, sequence, figures);
+        draw_figures(context, mesh, folder, sequence, figures.data);
         return 0;
     };
     SimulationInput input = folder.simulation;

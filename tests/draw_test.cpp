@@ -175,6 +175,19 @@ TEST(Draw, APictureOfFewerFacetsHasItsCodes) {
     EXPECT_EQ(draw_codes(context, mesh.view(), report, picture.view()), std::string({1, 0, 3, 2}));
 }
 
+TEST(Draw, AReportPassesOverThinWallsWhereMemoryEnds) {
+    const Mesh mesh = solid(shapes::torus(120, 40, 6));
+    const std::uint64_t facets = mesh.facets.size();
+    Context plenty, little({.memory_bytes = 70 * facets}), none({.memory_bytes = 20 * facets});
+    EXPECT_GT(draw_within_memory(plenty, mesh.view()).limits.thin_mm, 0);
+    const DrawReport report = draw_within_memory(little, mesh.view());
+    EXPECT_EQ(report.limits.thin_mm, 0);
+    EXPECT_GT(report.undercut_mm2, 1000);
+    EXPECT_EQ(draw_codes(little, mesh.view(), report, mesh.view()), "");
+    EXPECT_EQ(draw_codes(plenty, mesh.view(), report, mesh.view()).size(), facets);
+    EXPECT_THROW((void)draw_within_memory(none, mesh.view()), Error);
+}
+
 TEST(Draw, LimitsOutOfRangeAreTold) {
     for (const DrawLimits& limits : {DrawLimits{.draft_deg = -1},
                                      {.draft_deg = 46},

@@ -180,7 +180,7 @@ DrawReport check_draw(Context& context, MeshView mesh, const DrawLimits& limits)
     check(limits);
     DrawReport report;
     report.limits = limits;
-    const MemoryCharge charge(context, mesh.size() * 32, "looking at the draw");
+    const MemoryCharge charge(context, mesh.size() * 40, "looking at the draw");
     report.draft_deg.assign(mesh.size(), 90);
     report.finding.assign(mesh.size(), DrawFinding::none);
     report.thickness_mm.assign(mesh.size(), 0);

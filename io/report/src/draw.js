@@ -1,4 +1,5 @@
 // What keeps the pattern from being drawn: the kinds, in the order of the model's codes from 1 on, and their colours (0 is the rest).
+// Thin walls were not looked for where their limit is 0.
 
 import {figure} from './dom.js';
 import {data} from './report.js';
@@ -21,5 +22,6 @@ export const drawPlaces = drawKinds.flatMap(kind => kind.of.largest.map(place =>
 const sizeOf = kind => kind.of.length === undefined ? `${figure(kind.of.area / 100, 1)} cm²` : `${figure(kind.of.length, 0)} mm`;
 
 // "draft under 1°: 12.3 cm² in 4 places"; empty where nothing was found.
-export const drawSums = drawKinds.filter(kind => kind.of.places > 0)
+const found = drawKinds.filter(kind => kind.of.places > 0)
     .map(kind => `${kind.title}: ${sizeOf(kind)} in ${figure(kind.of.places, 0)} ${kind.of.places === 1 ? 'place' : 'places'}`);
+export const drawSums = limits.thin > 0 ? found : [...found, 'thin walls were not looked for: the memory limit'];

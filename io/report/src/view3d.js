@@ -500,7 +500,7 @@ class View {
         this.axisSelect = axisSelect;
         const [section, sectionSlider] = slider('at', {id: 'section', value: 0.5, disabled: true}, value => { this.state.section = value; this.place(); });
         this.sectionReadout = make('output');
-        const [mode, modeSelect] = choice('Colour by', 'mode', [['layers', 'layer'], ['surfaces', 'features and undercuts'], ['slope', 'slope (α)'], ['reach', 'accessibility'], ['left', 'left-over'], ['draw', 'draft and draw']], value => { this.state.mode = value; this.color(); });
+        const [mode, modeSelect] = choice('Colour by', 'mode', [['layers', 'layer'], ['surfaces', 'features and undercuts'], ['slope', 'slope (α)'], ['reach', 'accessibility'], ['left', 'left-over'], ...(this.model.draw.length ? [['draw', 'draft and draw']] : [])], value => { this.state.mode = value; this.color(); });
         this.modeSelect = modeSelect;
         const [shape, shapeSelect] = choice('Shape', 'shape', [['pattern', 'pattern as drawn'], ['built', 'wood as cut']], value => {
             this.state.shape = value;
