@@ -146,8 +146,8 @@ TEST(FacetRoles, AreWhatWindingNumbersSayOfFolds) {
         expect_roles(context, folded(shapes::torus(12, 30, 10), 0.15, 12, random), random, trial);
 }
 
-// Two facets on one edge that are folded onto one another are told whichever corners they are given from: here
-// the four of a tetrahedron pressed flat, whose volume is nothing.
+// Two facets on one edge that are folded onto one another are told whichever corners they are given from:
+// here the four of a tetrahedron pressed flat, whose volume is nothing.
 TEST(FacetRoles, TellFoldsFromWhicheverCorner) {
     Context context;
     const Vec3f a{0, 0, 5}, b{10, 0, 5}, c{5, 8, 5}, d{5, 3, 5};
