@@ -102,8 +102,29 @@ void Standing::rows_in_both(double radius, const std::array<double, 2>& a, const
     }
 }
 
+// The floor, and discs as the under side curves up to the rim.
+std::vector<Standing::Disc> Standing::discs_of(const Cutter& cutter) {
+    constexpr int kDiscs = 4;
+    const Envelope under = under_side(cutter);
+    std::vector<Disc> discs;
+    double inner = under.low;
+    if (under.core > 0) discs.push_back({under.core, under.low, under.low});
+    for (int k = 1; k <= kDiscs; ++k) {
+        const double radius = under.core + (under.radius - under.core) * k / kDiscs;
+        discs.push_back({radius, under.height(radius), inner});
+        inner = discs.back().height;
+    }
+    return discs;
+}
+
 void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to,
                    double core) {
+    if (cutter.profile == Cutter::Profile::other) {
+        for (const Disc& disc : discs_of(cutter))
+            cut({Cutter::Profile::flat, disc.radius}, {from[0], from[1], from[2] + disc.height},
+                {to[0], to[1], to[2] + disc.height}, core);
+        return;
+    }
     const std::array<double, 2> a{from[0], from[1]}, b{to[0], to[1]};
     const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
     const double low = std::min(from[2], to[2]), high = std::max(from[2], to[2]);
@@ -170,6 +191,12 @@ double Standing::top(double radius, const std::array<double, 2>& a, const std::a
 double Standing::free_tip(const Cutter& cutter, const std::array<double, 2>& a,
                           const std::array<double, 2>& b) const {
     if (cutter.profile == Cutter::Profile::flat) return top(cutter.radius - 2 * d_, a, b);
+    if (cutter.profile == Cutter::Profile::other) {
+        double most = -std::numeric_limits<double>::infinity();
+        for (const Disc& disc : discs_of(cutter))
+            if (disc.radius > 2 * d_) most = std::max(most, top(disc.radius - 2 * d_, a, b) - disc.under);
+        return most;
+    }
     const BallTable& table = ball_table(cutter.radius);
     const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
     double most = -std::numeric_limits<double>::infinity();

@@ -16,6 +16,8 @@ namespace slabwright {
 /// With d half the diagonal of a cell, a position of a flat end of radius R clears every cell whose centre
 /// lies within R − d of it down to its tip. A ball of radius R clears there down to tip + R − √(R² − (ρ +
 /// d)²), ρ being the distance of the centre, for no point of the cell is farther from the axis than ρ + d.
+/// Any other cutter is taken as a stack of flat discs within it, each as high over the tip as it lies.
+///
 /// Every cell takes the height from one position of the cutter that really was there, so leaving cuts out, or
 /// giving them in another order, keeps the bound a bound.
 class Standing {
@@ -76,6 +78,10 @@ private:
     // Where a flat cutter went last, level: what it covers there is no higher.
     std::array<double, 3> last_{kUnbounded, kUnbounded, kUnbounded};
     double last_radius_ = 0;
+    struct Disc {
+        double radius, height, under;  ///< mm; over the tip: its own height, and that of the next inner one
+    };
+    static std::vector<Disc> discs_of(const Cutter& cutter);
 };
 
 }  // namespace slabwright
