@@ -252,6 +252,10 @@ double core_recess(const Tool& tool) {
     return core > 0 ? core * std::tan(ramp_limit_deg(tool) * std::numbers::pi / 180) : 0;
 }
 
+double clearing_step(const Tool& tool) {
+    return std::min(tool.stepover * tool.diameter, tool.diameter - 2 * tool.corner_radius);
+}
+
 const Tool& tool_of_kind(const Job& job, ToolKind kind) {
     static constexpr const char* words[] = {"flat end mill", "ball end mill", "face mill", "drill",
                                             "bull-nose end mill"};

@@ -439,6 +439,10 @@ struct Job {
 /// the core's diameter times the ramp's slope. The core must be recessed by that for the ramp to be possible.
 [[nodiscard]] double core_recess(const Tool& tool);
 
+/// How far apart level passes that clear a floor may lie, mm: Tool::stepover, and no farther than the floor
+/// of a bull-nose is wide, which else leaves ridges between them.
+[[nodiscard]] double clearing_step(const Tool& tool);
+
 /// The first tool of a kind. @throws Error(usage, "job.tool") when the library has none
 [[nodiscard]] const Tool& tool_of_kind(const Job& job, ToolKind kind);
 
