@@ -162,15 +162,17 @@ TEST(BullNose, WhatMayStandAfterItIsABound) {
             standing.cut(cutter, at, to);
             at = to;
         }
-        std::size_t known = 0;
+        std::size_t known = 0, cut = 0;
         for (int j = 2; j < grid.ny; j += 7)
             for (int i = 2; i < grid.nx; i += 7) {
                 const double exact = stock.top(grid.index(i, j)),
                              bound = standing.top(0.01, {grid.x(i), grid.y(j)}, {grid.x(i), grid.y(j)});
                 ASSERT_GE(bound, exact) << "trial " << trial << " at " << grid.x(i) << ' ' << grid.y(j);
-                known += static_cast<std::size_t>(bound < top - 1);
+                if (exact >= top - 1) continue;
+                ++cut;
+                known += static_cast<std::size_t>(bound <= exact + 1.5);
             }
-        EXPECT_GT(known, 500u) << "the bound says nothing";
+        EXPECT_GT(2 * known, cut) << "the bound says nothing";
         // No exact point is within the cutter where it may go down to; a cell's diagonal at the rim excepted.
         for (int query = 0; query < 50; ++query) {
             const std::array<double, 2> p{place(random), place(random)};
@@ -207,20 +209,19 @@ TEST(BullNose, PlansWithItAreProvenAndTheFilletIsSeen) {
     const TemporaryFolder folder;
     const std::string rest = tool_text(1, "face", 50) + tool_text(3, "ball", 6, "plunges = true\n"),
                       fixed = "[selection]\nmode = \"fixed\"\n";
-    const json with_flat = planned(folder, "flat", fixed + rest + tool_text(5, "flat", 12)),
-               alone = planned(folder, "alone", fixed + rest + bull_nose_text()),
-               followed = planned(folder, "followed",
-                                  "[selection]\ncompare = false\n" + rest +
-                                      tool_text(4, "bull-nose", 16, "corner_radius = 2.0\n") +
-                                      tool_text(5, "flat", 12));
+    const json alone = planned(folder, "alone", fixed + rest + bull_nose_text()),
+               followed = planned(
+                   folder, "followed",
+                   "[selection]\ncompare = false\n" + rest + bull_nose_text() + tool_text(5, "flat", 6));
     EXPECT_GT(operations_of(alone, 4)["rough"], 0);
     EXPECT_EQ(alone["plan"]["tools"][2]["kind"], "bull-nose");
     EXPECT_EQ(alone["plan"]["tools"][2]["corner_radius"], 2.0);
-    // The corners at the foot of walls stay, and are told as out of every tool's reach.
+    // The corners at the foot of walls stay, and are told as out of every tool's reach, unless a flat
+    // follows.
+    EXPECT_GT(operations_of(followed, 4)["rough"], 0);
+    EXPECT_GT(operations_of(followed, 5)["corner"], 0);
     EXPECT_GT(alone["totals"]["unreachable_mm2"].get<double>(),
-              with_flat["totals"]["unreachable_mm2"].get<double>() + 20);
-    EXPECT_NEAR(followed["totals"]["unreachable_mm2"].get<double>(),
-                with_flat["totals"]["unreachable_mm2"].get<double>(), 20);
+              followed["totals"]["unreachable_mm2"].get<double>() + 20);
 }
 
 }  // namespace
