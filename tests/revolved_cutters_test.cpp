@@ -17,6 +17,7 @@
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/stock/sweep.h"
+#include "tests/mesh_shapes.h"
 #include "tests/support/height_field.h"
 #include "tests/support/seed.h"
 
@@ -485,6 +486,36 @@ TEST(RevolvedCutters, GougesOfABullNoseAreTheDeepestPoints) {
                 << "solid " << solid << " motion " << i;
     }
     std::printf("%d poses, %d touch; a depth differs by %.2e mm at most\n", poses, touching, worst);
+}
+
+// Walls that the layer's top cuts are upright only but for rounding.
+TEST(RevolvedCutters, ABullNoseIsNoDeeperThanTheCylinderAroundIt) {
+    Context context;
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> u(-14, 14), uz(-1, 5), turn(0, 6);
+    int deep = 0;
+    for (int solid = 0; solid < 40; ++solid) {
+        const double a = turn(random);
+        std::vector<std::array<Vec3f, 3>> facets = shapes::box({-6, -5, 0}, {7, 4, 9});
+        for (auto& facet : facets)
+            for (Vec3f& v : facet)
+                v = {static_cast<float>(v.x * std::cos(a) - v.y * std::sin(a)),
+                     static_cast<float>(v.x * std::sin(a) + v.y * std::cos(a)), v.z};
+        const Mesh mesh = weld(context, facets);
+        const StandingPart part(context, mesh.view());
+        for (int i = 0; i < 60; ++i) {
+            const Point3 from{u(random), u(random), uz(random)};
+            Point3 to{u(random), u(random), from[2]};
+            if (i % 2 == 0) to = {from[0] + 0.1, from[1] + 0.05, from[2]};
+            const double top = 5.1371;
+            const Penetration round = part.bull_nose(top, from, to, 4, 1.5, 0),
+                              sharp = part.cylinder(top, from, to, 4, 0);
+            EXPECT_LE(round.found ? round.depth : 0, (sharp.found ? sharp.depth : 0) + 1e-6)
+                << "solid " << solid << " motion " << i;
+            deep += static_cast<int>(round.found);
+        }
+    }
+    EXPECT_GT(deep, 200);
 }
 
 }  // namespace

@@ -153,7 +153,9 @@ RayDistance disc_distance(const Point3& c, double disc, const Triangle& t) {
     const Point3 u = minus(t[1], t[0]), v = minus(t[2], t[0]);
     Point3 n{u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
     const double area2 = std::sqrt(dot(n, n));
-    if (area2 > 0 && n[2] != 0) {
+    // Of a facet that is upright but for rounding the edges tell all: what is over the disc lies under one.
+    constexpr double upright = 1e-9;
+    if (area2 > 0 && std::abs(n[2]) > upright * area2) {
         const double sign = n[2] > 0 ? 1 / area2 : -1 / area2;
         for (double& k : n) k *= sign;
         // Of the disc the place at its uphill rim is the nearest to the plane.
@@ -161,11 +163,14 @@ RayDistance disc_distance(const Point3& c, double disc, const Triangle& t) {
         Point3 rim = c;
         if (across > 0) rim[0] -= disc * n[0] / across, rim[1] -= disc * n[1] / across;
         const double s = dot(n, minus(rim, t[0])), off = std::max(0.0, s);
-        const Point3 foot{rim[0] - off * n[0], rim[1] - off * n[1], rim[2] - off * n[2]};
+        Point3 foot{rim[0] - off * n[0], rim[1] - off * n[1], rim[2] - off * n[2]};
+        if (s < 0) foot[2] -= s / n[2];
         bool left = false, right = false;
         for (std::size_t k = 0; k < 3; ++k) {
-            const Point3 &p = t[k], &q = t[(k + 1) % 3];
-            const double side = (q[0] - p[0]) * (foot[1] - p[1]) - (q[1] - p[1]) * (foot[0] - p[0]);
+            const Point3 e = minus(t[(k + 1) % 3], t[k]), w = minus(foot, t[k]);
+            const Point3 cross{e[1] * w[2] - e[2] * w[1], e[2] * w[0] - e[0] * w[2],
+                               e[0] * w[1] - e[1] * w[0]};
+            const double side = dot(n, cross);
             left |= side > 0, right |= side < 0;
         }
         if (!(left && right)) return {off, {off * n[0], off * n[1], off * n[2]}};
