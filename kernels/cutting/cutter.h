@@ -11,7 +11,7 @@ namespace slabwright {
 /// A ball of radius r under a shank of the same radius, a flat-ended cylinder of radius r, or another surface
 /// of revolution whose height over the tip is a convex function of the distance from the axis: a bull-nose,
 /// a tapered ball, a cone. Positions are its tip's. Balls and flats are met many facets at a time; the others
-/// one by one, about ten times slower.
+/// one by one, which takes longer.
 struct Cutter {
     enum class Profile : std::uint8_t { flat, ball, other } profile = Profile::flat;
     double radius = 0;  ///< mm
