@@ -28,7 +28,7 @@ double max_bonded_layer_thickness(const Job& job) {
 double max_layer_of_longest(const Job& job) {
     double flat = 0, ball = 0;
     for (const Tool& tool : job.tools) {
-        if (tool.kind == ToolKind::flat) flat = std::max(flat, max_layer_of(job, tool));
+        if (roughs_layers(tool.kind)) flat = std::max(flat, max_layer_of(job, tool));
         if (tool.kind == ToolKind::ball) ball = std::max(ball, max_layer_of(job, tool));
     }
     return std::min(flat, ball);
@@ -171,6 +171,7 @@ bool plunges_by_default(ToolKind kind) {
             return true;
         case ToolKind::flat:
         case ToolKind::face:
+        case ToolKind::bull_nose:
             break;
     }
     return false;
@@ -184,6 +185,8 @@ CutterShape cutter_shape(const Tool& tool) {
             break;
         case ToolKind::ball:
             return {radius, radius, 0};
+        case ToolKind::bull_nose:
+            return {radius, tool.corner_radius, 0};
         case ToolKind::drill:
             return {radius, 0, 59 * std::numbers::pi / 180};
     }
@@ -194,7 +197,21 @@ bool is_end_mill(ToolKind kind) {
     switch (kind) {
         case ToolKind::flat:
         case ToolKind::ball:
+        case ToolKind::bull_nose:
             return true;
+        case ToolKind::face:
+        case ToolKind::drill:
+            break;
+    }
+    return false;
+}
+
+bool roughs_layers(ToolKind kind) {
+    switch (kind) {
+        case ToolKind::flat:
+        case ToolKind::bull_nose:
+            return true;
+        case ToolKind::ball:
         case ToolKind::face:
         case ToolKind::drill:
             break;
@@ -207,6 +224,7 @@ bool mills(ToolKind kind) {
         case ToolKind::flat:
         case ToolKind::ball:
         case ToolKind::face:
+        case ToolKind::bull_nose:
             return true;
         case ToolKind::drill:
             break;
@@ -217,7 +235,7 @@ bool mills(ToolKind kind) {
 double core_diameter_of(const Tool& tool) {
     constexpr double kFlatShare = 0.3, kFaceShare = 0.8;
     const bool face = tool.kind == ToolKind::face;
-    if (tool.plunges || (!face && tool.kind != ToolKind::flat)) return 0;
+    if (tool.plunges || (!face && !roughs_layers(tool.kind))) return 0;
     if (tool.core_diameter >= 0) return tool.core_diameter;
     return (face ? kFaceShare : kFlatShare) * tool.diameter;
 }
@@ -234,9 +252,14 @@ double core_recess(const Tool& tool) {
     return core > 0 ? core * std::tan(ramp_limit_deg(tool) * std::numbers::pi / 180) : 0;
 }
 
+double clearing_step(const Tool& tool) {
+    return std::min(tool.stepover * tool.diameter, tool.diameter - 2 * tool.corner_radius);
+}
+
 const Tool& tool_of_kind(const Job& job, ToolKind kind) {
-    static constexpr const char* words[] = {"flat end mill", "ball end mill", "face mill", "drill"};
-    static constexpr const char* keys[] = {"flat", "ball", "face", "drill"};
+    static constexpr const char* words[] = {"flat end mill", "ball end mill", "face mill", "drill",
+                                            "bull-nose end mill"};
+    static constexpr const char* keys[] = {"flat", "ball", "face", "drill", "bull-nose"};
     const auto found =
         std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& tool) { return tool.kind == kind; });
     if (found != job.tools.end()) return *found;

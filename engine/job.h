@@ -62,7 +62,7 @@ enum class AccessRule : std::uint8_t { sections, exact, printed };
 /// The L from which the roughing stepdown follows (LUO 5.5.3.3): the finish tool's radius,
 /// tolerances.rough_cusp, or the smaller.
 enum class RoughLimit : std::uint8_t { smaller, finish_radius, cusp };
-enum class ToolKind : std::uint8_t { flat, ball, face, drill };
+enum class ToolKind : std::uint8_t { flat, ball, face, drill, bull_nose };
 /// Where x 0, y 0 of the programs lies: where the model has it, at the base board's corner of least x and y,
 /// in the base board's middle, or at a pin (Machine::pin).
 enum class WorkZero : std::uint8_t { model, corner, centre, pin };
@@ -91,9 +91,11 @@ struct Tool {
     double stepdown_min = 0, stepdown_max = 0;  ///< LUO table 5.4
     double stepover = 0.5;                      ///< share of the diameter, for clearing
     bool plunges = false;                       ///< cuts straight down into stock (plunges_by_default)
-    double strength_mpa = 0;    ///< the cutter's own in bending, as its maker states it; 0: not checked
-    double core_diameter = -1;  ///< within which it has no edge, flat and face; negative: core_diameter_of()
-    double ramp_deg = -1;       ///< steepest way down into stock; negative: ramp_limit_deg()
+    double strength_mpa = 0;  ///< the cutter's own in bending, as its maker states it; 0: not checked
+    double core_diameter =
+        -1;  ///< within which it has no edge: flat, face, bull-nose; negative: core_diameter_of()
+    double ramp_deg = -1;      ///< steepest way down into stock; negative: ramp_limit_deg()
+    double corner_radius = 0;  ///< of a bull-nose, between its floor and its side
 };
 
 struct Material {
@@ -416,14 +418,17 @@ struct Job {
 [[nodiscard]] bool plunges_by_default(ToolKind kind);
 /// The lower end of a tool; a drill's is a point of 118°.
 [[nodiscard]] CutterShape cutter_shape(const Tool& tool);
-/// Whether it roughs and finishes: flat and ball end mills.
+/// Whether it roughs and finishes: flat, bull-nose and ball end mills.
 [[nodiscard]] bool is_end_mill(ToolKind kind);
+/// Whether it can rough a layer, level by level: flat and bull-nose end mills. A bull-nose goes where the
+/// flat around it may; what its corners leave at the foot of walls is for a flat.
+[[nodiscard]] bool roughs_layers(ToolKind kind);
 /// Whether it cuts sideways: all but drills.
 [[nodiscard]] bool mills(ToolKind kind);
 
-/// The diameter within which a flat end mill or a face mill has no edge, mm. Tool::core_diameter where that
-/// is given; else 0.3 of an end mill's diameter and 0.8 of a face mill's. 0 of all others and of what
-/// plunges.
+/// The diameter within which a flat or bull-nose end mill or a face mill has no edge, mm. Tool::core_diameter
+/// where that is given; else 0.3 of an end mill's diameter and 0.8 of a face mill's. 0 of all others and of
+/// what plunges.
 [[nodiscard]] double core_diameter_of(const Tool& tool);
 
 /// The steepest ramp into stock, degrees. Tool::ramp_deg where that is given; else 2 for a face mill, 10 for
@@ -433,6 +438,10 @@ struct Job {
 /// How high stock may stand under a tool's core, mm: as high as its steepest straight ramp leaves it there,
 /// the core's diameter times the ramp's slope. The core must be recessed by that for the ramp to be possible.
 [[nodiscard]] double core_recess(const Tool& tool);
+
+/// How far apart level passes that clear a floor may lie, mm: Tool::stepover, and no farther than the floor
+/// of a bull-nose is wide, which else leaves ridges between them.
+[[nodiscard]] double clearing_step(const Tool& tool);
 
 /// The first tool of a kind. @throws Error(usage, "job.tool") when the library has none
 [[nodiscard]] const Tool& tool_of_kind(const Job& job, ToolKind kind);

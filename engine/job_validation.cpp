@@ -66,6 +66,25 @@ int highest_tool(Post post) {
     return 99999;
 }
 
+void validate_corner(const Tool& tool, const std::string& key) {
+    if (tool.kind != ToolKind::bull_nose) {
+        if (tool.corner_radius != 0)
+            refuse(key, fmt::format("{} is {}, but the tool is no bull-nose", key, tool.corner_radius),
+                   "leave it out, or say kind = \"bull-nose\"");
+        return;
+    }
+    require(
+        key, tool.corner_radius, 0.01, tool.diameter / 2, Ends::closed,
+        "a bull-nose has a corner between 0.01 mm and its radius: a sharper one is a flat, a rounder one a "
+        "ball");
+    if (tool.corner_radius >= tool.diameter / 2)
+        refuse(key, fmt::format("{} is {}, the tool's whole radius", key, tool.corner_radius),
+               "say kind = \"ball\"");
+    if (tool.corner_radius > tool.flute_length)
+        refuse(key, fmt::format("{} is {}, more than the flute length", key, tool.corner_radius),
+               "give the radius between floor and side");
+}
+
 void validate_tool(const Tool& tool, std::size_t position, Post post) {
     const auto key = [&](const char* name) { return fmt::format("tool[{}].{}", position + 1, name); };
     require(key("number"), tool.number, 1, highest_tool(post));
@@ -106,13 +125,15 @@ void validate_tool(const Tool& tool, std::size_t position, Post post) {
                fmt::format("give a share of the diameter that makes {} mm at least", kLeastAdvance));
     require(key("strength_mpa"), tool.strength_mpa, 0, 1e5);
     require(key("core_diameter"), tool.core_diameter, -tool.diameter, tool.diameter, Ends::open_both);
-    const bool may_have_core = !tool.plunges && (tool.kind == ToolKind::flat || tool.kind == ToolKind::face);
+    const bool may_have_core = !tool.plunges && (roughs_layers(tool.kind) || tool.kind == ToolKind::face);
     if (tool.core_diameter > 0 && !may_have_core)
         refuse(key("core_diameter"),
                fmt::format("{} is {}, but the tool cuts at its middle", key("core_diameter"),
                            tool.core_diameter),
-               "only flat end mills and face mills with plunges = false have a core; leave it out");
+               "only flat and bull-nose end mills and face mills with plunges = false have a core; leave it "
+               "out");
     require(key("ramp_deg"), tool.ramp_deg, -90, 90);
+    validate_corner(tool, key("corner_radius"));
 }
 
 void validate_boards(const Slabs& s) {

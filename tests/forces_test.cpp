@@ -46,6 +46,7 @@ CutSegment random_cut(std::mt19937_64& random, CutterProfile profile) {
     s.profile = profile;
     s.flutes = 1 + static_cast<int>(random() % 6);
     s.radius_mm = drawn(random, 1, 26);
+    if (profile == CutterProfile::bull_nose) s.corner_mm = drawn(random, 0.05, 1) * s.radius_mm;
     s.helix_rad = random() % 5 == 0 ? 0 : drawn(random, 0, kPi / 3);
     s.high_mm = std::exp(drawn(random, std::log(0.01), std::log(3.0))) * s.radius_mm;
     s.low_mm = random() % 3 == 0 ? drawn(random, 0, 0.9) * s.high_mm : 0;
@@ -78,19 +79,19 @@ struct Discs {
 
 // Where disc i of n lies, how much edge it has and at what slope.
 double disc_height(const CutSegment& s, int i, int n, double& db, double& kappa) {
-    // Equal steps of the edge's slope on a ball, of height on the rest.
+    // Equal steps of the edge's slope on a rounding, of height on the rest.
+    const double corner = s.profile == CutterProfile::bull_nose ? s.corner_mm : s.radius_mm;
     auto edge = [&](double h) {
         if (s.profile == CutterProfile::flat) return h;
-        return h < s.radius_mm ? s.radius_mm * std::acos(1 - h / s.radius_mm)
-                               : s.radius_mm * kPi / 2 + h - s.radius_mm;
+        return h < corner ? corner * std::acos(1 - h / corner) : corner * kPi / 2 + h - corner;
     };
     const double low = edge(s.low_mm), high = edge(s.high_mm), e = low + (high - low) * (i + 0.5) / n;
     db = (high - low) / n;
     kappa = kPi / 2;
     if (s.profile == CutterProfile::flat) return e;
-    if (e >= s.radius_mm * kPi / 2) return e - s.radius_mm * kPi / 2 + s.radius_mm;
-    kappa = e / s.radius_mm;
-    return s.radius_mm * (1 - std::cos(kappa));
+    if (e >= corner * kPi / 2) return e - corner * kPi / 2 + corner;
+    kappa = e / corner;
+    return corner * (1 - std::cos(kappa));
 }
 void add_disc(Discs& f, const CutSegment& s, double phi, double kappa, double db) {
     const double h = s.chip_load_mm * std::sin(phi) * std::sin(kappa);
@@ -99,7 +100,8 @@ void add_disc(Discs& f, const CutSegment& s, double phi, double kappa, double db
     f.x += -t * std::cos(phi) - (r * std::sin(kappa) + a * std::cos(kappa)) * std::sin(phi);
     f.y += t * std::sin(phi) - (r * std::sin(kappa) + a * std::cos(kappa)) * std::cos(phi);
     f.z += a * std::sin(kappa) - r * std::cos(kappa);
-    f.torque += t * s.radius_mm * std::sin(kappa);
+    const double corner = s.profile == CutterProfile::bull_nose ? s.corner_mm : s.radius_mm;
+    f.torque += t * (s.radius_mm - corner + corner * std::sin(kappa));
 }
 
 // Discs in z, each tooth wrapped into one turn and engaged or not by its angle: as a first implementation
@@ -140,7 +142,7 @@ TEST(Forces, ReferenceAgreesWithDiscs) {
     std::mt19937_64 random(seed);
     double worst = 0;
     for (int i = 0; i < 60; ++i) {
-        const CutSegment s = random_cut(random, i % 2 ? CutterProfile::ball : CutterProfile::flat);
+        const CutSegment s = random_cut(random, static_cast<CutterProfile>(i % 3));
         const SegmentForces f = reference_forces(s, 1e-4);
         Discs peak, mean;
         double plane = 0, all = 0, mean_plane = 0;
@@ -179,7 +181,7 @@ TEST(Forces, ReferenceAgreesWithDiscs) {
 TEST(Forces, MeansAreTheIntegralsOverArcAndEdge) {
     std::mt19937_64 random(12);
     for (int i = 0; i < 40; ++i) {
-        const CutSegment s = random_cut(random, i % 2 ? CutterProfile::ball : CutterProfile::flat);
+        const CutSegment s = random_cut(random, static_cast<CutterProfile>(i % 3));
         const int n = 400;
         Discs mean;
         for (int d = 0; d < n; ++d) {
@@ -323,7 +325,9 @@ TEST(ForceSolver, DeviceIsTheReferenceWithin1e4OfThePeak) {
     }
     std::vector<CutSegment> cuts(10000);
     for (std::size_t i = 0; i < cuts.size(); ++i)
-        cuts[i] = random_cut(random, i % 2 ? CutterProfile::ball : CutterProfile::flat);
+        cuts[i] = random_cut(random, i % 50 == 49 ? CutterProfile::bull_nose
+                                     : i % 2      ? CutterProfile::ball
+                                                  : CutterProfile::flat);
     std::vector<SegmentForces> found(cuts.size());
     solver.solve(context, cuts, found);
     double worst[2] = {0, 0};

@@ -98,6 +98,9 @@ TEST(Job, EveryKeyRoundTrips) {
     Scramble scramble{std::mt19937(seed)};
     visit_job_keys(job, scramble);
     for (Tool& tool : job.tools) visit_tool_keys(tool, scramble);
+    for (Tool& tool : job.tools) tool.corner_radius = 0;  // only a bull-nose has one
+    job.tools[1].kind = ToolKind::bull_nose;
+    job.tools[1].corner_radius = scramble.real(0.5, 2);
     const std::string text = job_toml(job);
     EXPECT_NE(text, job_toml(Job{}));
     const Job read = parse_job(text, "scrambled");
@@ -108,6 +111,8 @@ TEST(Job, EveryKeyRoundTrips) {
     EXPECT_EQ(read.cutting.finish_feed, job.cutting.finish_feed);
     EXPECT_EQ(read.tools[2].stickout, job.tools[2].stickout);
     EXPECT_EQ(read.tools[0].kind, ToolKind::drill);
+    EXPECT_EQ(read.tools[1].kind, ToolKind::bull_nose);
+    EXPECT_EQ(read.tools[1].corner_radius, job.tools[1].corner_radius);
 }
 
 TEST(Job, EveryKeyIsCommented) {

@@ -40,9 +40,7 @@ CutSegment segment_of(const CutClass& c, const CutSegment& idle, const Tool& too
     const double r = tool.diameter / 2;
     cut.low_mm = c.low * r / steps.low;
     cut.high_mm = cut.low_mm + depth_of(c.depth, steps);
-    const bool cap = cut.profile == CutterProfile::ball && cut.high_mm < r;
-    const double circle = cap ? std::sqrt(cut.high_mm * (2 * r - cut.high_mm)) : r;
-    cut.arc = engagement_arc(circle, c.width * tool.diameter / steps.width,
+    cut.arc = engagement_arc(radius_at(cut, cut.high_mm), c.width * tool.diameter / steps.width,
                              c.left ? MillingSense::up : MillingSense::down);
     cut.chip_load_mm = feed / (cut.spindle_rpm * tool.flutes);
     return cut;

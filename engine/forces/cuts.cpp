@@ -15,6 +15,7 @@ CutSegment idle_cut(const Job& job, const Tool& tool) {
     cut.profile = cutter_profile(cutter_shape(tool));
     cut.flutes = tool.flutes;
     cut.radius_mm = tool.diameter / 2;
+    cut.corner_mm = cutter_shape(tool).form() == CutterForm::bull_nose ? cutter_shape(tool).corner : 0;
     cut.helix_rad = tool.helix_rad;
     cut.coefficients = coefficients_of(job.material, tool.helix_rad);
     cut.spindle_rpm = std::min(tool.max_rpm, job.machine.max_rpm);
@@ -34,9 +35,8 @@ CutSegment hardest_cut(const Job& job, const Tool& tool, double depth_mm) {
     if (tool.kind != ToolKind::ball) return cut;
     cut.chip_load_mm = std::min({tool.max_feed, job.machine.max_feed, job.cutting.finish_feed}) /
                        (cut.spindle_rpm * tool.flutes);
-    const double r = cut.radius_mm, circle = depth_mm < r ? std::sqrt(depth_mm * (2 * r - depth_mm)) : r;
-    cut.arc =
-        engagement_arc(circle, job.cutting.wall_allowance + job.tolerances.rough_cusp, MillingSense::up);
+    cut.arc = engagement_arc(radius_at(cut, depth_mm), job.cutting.wall_allowance + job.tolerances.rough_cusp,
+                             MillingSense::up);
     return cut;
 }
 

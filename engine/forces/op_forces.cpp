@@ -53,9 +53,7 @@ CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job&
     if (!(depth > 0)) depth = job.cutting.floor_allowance + steps;
     if (!(width > 0)) width = slot;
     s.high_mm = depth;
-    const bool cap = s.profile == CutterProfile::ball && depth < s.radius_mm;
-    s.arc = engagement_arc(cap ? std::sqrt(depth * (2 * s.radius_mm - depth)) : s.radius_mm, width,
-                           MillingSense::up);
+    s.arc = engagement_arc(radius_at(s, depth), width, MillingSense::up);
     return s;
 }
 

@@ -31,7 +31,7 @@ void run_through(Context& context, StandingSlab& slab, const Operation& op, cons
             // least step it is no slab but a sliver that tears off; and what a ball or a wall's finishing has
             // under its tip is not what carries it.
             const bool floor =
-                op.kind == OperationKind::finish && tool.kind == ToolKind::flat && op.stepdown == 0;
+                op.kind == OperationKind::finish && roughs_layers(tool.kind) && op.stepdown == 0;
             const double under = s.at[2] - layer.z_bottom, wood = roughs(op.kind) ? under + s.high
                                                                   : floor         ? under
                                                                                   : 0;

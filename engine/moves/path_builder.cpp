@@ -76,7 +76,7 @@ Cutter PathBuilder::middle() const {
     const Cutter& cutter = around_.cutter;
     if (cutter.profile == Cutter::Profile::ball) return {cutter.profile, kBallMiddle * cutter.radius};
     const bool whole = face_ && !plunges_;
-    return {cutter.profile, std::max(core_, whole ? cutter.radius - kRim : kMiddle * cutter.radius)};
+    return {Cutter::Profile::flat, std::max(core_, whole ? cutter.radius - kRim : kMiddle * cutter.radius)};
 }
 
 // The steepest slope on which no more stands under the core than its recess, where a point is under it for
@@ -257,7 +257,7 @@ bool PathBuilder::enter(std::span<const PathPoint> run) {
 // on the right of a run that climbs, so the circle's room is looked for on the other side. Whole turns, none
 // steeper than the ramp.
 bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
-    if (around_.part == nullptr || around_.cutter.profile != Cutter::Profile::flat) return false;
+    if (around_.part == nullptr || around_.cutter.profile == Cutter::Profile::ball) return false;
     const PathPoint& first = run.front();
     double ux = 0, uy = 0;
     for (std::size_t k = 1; k < run.size() && ux == 0 && uy == 0; ++k) {

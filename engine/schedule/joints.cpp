@@ -272,7 +272,7 @@ SlabCut hardest_on_slab(const Job& job) {
     const bool faced = std::any_of(job.tools.begin(), job.tools.end(), is_face);
     SlabCut most;
     for (const Tool& tool : job.tools) {
-        if (!is_face(tool) && tool.kind != ToolKind::flat) continue;
+        if (!is_face(tool) && !roughs_layers(tool.kind)) continue;
         const double depth = is_face(tool) ? job.cutting.face_depth : tool.stepdown_max;
         if (!(depth > 0)) continue;
         CutSegment cut = slot_cut(job, tool, std::min(depth, tool.flute_length));

@@ -66,6 +66,11 @@ std::vector<std::uint32_t> check_drill(const StandingPart& part, double z_top, c
     return beyond;
 }
 
+StandingPart::Form form_of(ToolKind kind) {
+    if (kind == ToolKind::ball) return StandingPart::Form::ball;
+    return kind == ToolKind::bull_nose ? StandingPart::Form::bull_nose : StandingPart::Form::cylinder;
+}
+
 }  // namespace
 
 Tool wider(const Tool& tool, double by) {
@@ -129,8 +134,9 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
             }
             auto check = [&](StandingPart::Form form, double thick, GougePlace& place,
                              std::atomic<double>* known) {
-                StandingPart::Found found = part.deepest(form, z_top, motions, thick, options.ignore,
-                                                         options.tolerance, known, chords);
+                StandingPart::Found found =
+                    part.deepest(form, z_top, motions, thick, options.ignore, options.tolerance, known,
+                                 chords, form == StandingPart::Form::bull_nose ? tool.corner_radius : 0);
                 if (found.most.found) place = {found.most.depth, lines[found.motion], found.most.tip};
                 return std::move(found.beyond);
             };
@@ -138,8 +144,7 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
             const std::vector<std::uint32_t> gouges =
                 tool.kind == ToolKind::drill
                     ? check_drill(part, z_top, tool, motions, lines, options, r.cutter)
-                    : check(ball ? StandingPart::Form::ball : StandingPart::Form::cylinder, radius, r.cutter,
-                            ball ? &deepest : nullptr);
+                    : check(form_of(tool.kind), radius, r.cutter, ball ? &deepest : nullptr);
             r.gouges = gouges.size();
             add_lines(r.gouge_lines, lines_of(lines, gouges));
             std::vector<std::uint32_t> touched;

@@ -86,8 +86,10 @@ bool worse(const Patch& a, const Patch& b) {
 Reach::Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_bottom, double z_top,
              double lowest)
     : part_(part), z_bottom_(z_bottom), z_top_(z_top), lowest_(lowest) {
+    // What a bull-nose reaches, a ball no wider than its floor or the flat around it reaches too, but for its
+    // corners.
     for (const Tool& tool : tools)
-        if (is_end_mill(tool.kind)) tools_.push_back(tool);
+        if (tool.kind == ToolKind::flat || tool.kind == ToolKind::ball) tools_.push_back(tool);
     std::stable_sort(tools_.begin(), tools_.end(),
                      [](const Tool& a, const Tool& b) { return a.diameter < b.diameter; });
 }

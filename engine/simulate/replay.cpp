@@ -36,15 +36,14 @@ void rate(ReplayPiece& piece, const Tool& tool, const Material& m, double feed, 
     s.profile = cutter_profile(cutter_shape(tool));
     s.flutes = tool.flutes;
     s.radius_mm = radius;
+    s.corner_mm = s.profile == CutterProfile::bull_nose ? cutter_shape(tool).corner : 0;
     s.helix_rad = tool.helix_rad;
     s.coefficients = coefficients_of(m, tool.helix_rad);
     s.spindle_rpm = rpm;
     s.chip_load_mm = feed / (rpm * tool.flutes);
     s.high_mm = std::min(piece.depth_mm, 64 * radius);
     // A ball that cuts less deep than its radius is as wide as its circle at that depth.
-    const bool cap = s.profile == CutterProfile::ball && s.high_mm < radius;
-    s.arc = engagement_arc(cap ? std::sqrt(s.high_mm * (2 * radius - s.high_mm)) : radius, piece.width_mm,
-                           MillingSense::up);
+    s.arc = engagement_arc(radius_at(s, s.high_mm), piece.width_mm, MillingSense::up);
     const CutForce force = peak_force(s, kForceShare);
     piece.force_n = force.peak_resultant_n;
     piece.deflection_mm = cutter_deflection(force.peak_in_plane_n, tool.stickout, tool.diameter);

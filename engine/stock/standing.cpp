@@ -37,23 +37,26 @@ Standing::Standing(std::array<double, 2> min, std::array<double, 2> max, double 
       ny_(std::max(1, static_cast<int>(std::ceil((max[1] - min[1]) / cell_)))),
       height_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_), static_cast<float>(kRounding)) {}
 
-Standing::BallTable Standing::made_table(double radius) const {
-    BallTable table{radius, 0, std::vector<float>(kTable + 1)};
+Standing::HeightTable Standing::made_table(const Cutter& cutter) const {
+    const double radius = cutter.radius;
+    HeightTable table{cutter, 0, std::vector<float>(kTable + 1)};
     const double reach = radius - d_;
     if (reach <= 0) return table;
     table.scale = kTable / (reach * reach);
     for (std::size_t k = 0; k <= kTable; ++k) {
         const double rho =
             std::min(radius, std::min(reach, std::sqrt((static_cast<double>(k) + 1) / table.scale)) + d_);
-        table.height[k] = static_cast<float>(radius - std::sqrt(radius * radius - rho * rho));
+        table.height[k] = static_cast<float>(cutter.profile == Cutter::Profile::ball
+                                                 ? radius - std::sqrt(radius * radius - rho * rho)
+                                                 : under_side(cutter).height(rho));
     }
     return table;
 }
 
-const Standing::BallTable& Standing::ball_table(double radius) const {
-    const auto found =
-        std::find_if(tables_.begin(), tables_.end(), [&](const BallTable& t) { return t.radius == radius; });
-    return found != tables_.end() ? *found : tables_.emplace_back(made_table(radius));
+const Standing::HeightTable& Standing::table_of(const Cutter& cutter) const {
+    const auto found = std::find_if(tables_.begin(), tables_.end(),
+                                    [&](const HeightTable& t) { return t.cutter == cutter; });
+    return found != tables_.end() ? *found : tables_.emplace_back(made_table(cutter));
 }
 
 // Calls take(first row, rows, spans) for the cells whose centres lie within `radius` of the segment from a to
@@ -104,6 +107,11 @@ void Standing::rows_in_both(double radius, const std::array<double, 2>& a, const
 
 void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to,
                    double core) {
+    if (cutter.profile == Cutter::Profile::other && core > 0) {
+        // Its floor has the core; the rounding around that takes what it passes over.
+        const double floor = under_side(cutter).core;
+        if (floor > d_) cut({Cutter::Profile::flat, floor}, from, to, core);
+    }
     const std::array<double, 2> a{from[0], from[1]}, b{to[0], to[1]};
     const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
     const double low = std::min(from[2], to[2]), high = std::max(from[2], to[2]);
@@ -138,7 +146,7 @@ void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, cons
         if (level) last_ = to, last_radius_ = cutter.radius;
         return;
     }
-    const BallTable& table = ball_table(cutter.radius);
+    const HeightTable& table = table_of(cutter);
     const float* const profile = table.height.data();
     const double scale = table.scale;
     // The place of the way nearest to the cell's centre: on steep ways others may be lower, but this one is
@@ -152,6 +160,7 @@ void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, cons
             const double px = x0_ + i * cell_ - a[0];
             const double t = std::clamp(px * fx + py * fy, 0.0, 1.0), ex = px - t * dx, ey = py - t * dy;
             const auto bin = std::min(kTable, static_cast<std::size_t>((ex * ex + ey * ey) * scale));
+            if (core > 0 && profile[bin] <= 0) continue;
             h[i] = std::min(h[i], static_cast<float>(z0 + t * rise + static_cast<double>(profile[bin])));
         }
     });
@@ -170,7 +179,7 @@ double Standing::top(double radius, const std::array<double, 2>& a, const std::a
 double Standing::free_tip(const Cutter& cutter, const std::array<double, 2>& a,
                           const std::array<double, 2>& b) const {
     if (cutter.profile == Cutter::Profile::flat) return top(cutter.radius - 2 * d_, a, b);
-    const BallTable& table = ball_table(cutter.radius);
+    const HeightTable& table = table_of(cutter);
     const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
     double most = -std::numeric_limits<double>::infinity();
     rows(cutter.radius - d_, a, b, [&](int j, int first, int last) {

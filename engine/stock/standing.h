@@ -16,6 +16,9 @@ namespace slabwright {
 /// With d half the diagonal of a cell, a position of a flat end of radius R clears every cell whose centre
 /// lies within R − d of it down to its tip. A ball of radius R clears there down to tip + R − √(R² − (ρ +
 /// d)²), ρ being the distance of the centre, for no point of the cell is farther from the axis than ρ + d.
+/// So does any other cutter whose under side rises from its floor, a bull-nose: down to that side's height at
+/// ρ + d.
+///
 /// Every cell takes the height from one position of the cutter that really was there, so leaving cuts out, or
 /// giving them in another order, keeps the bound a bound.
 class Standing {
@@ -49,15 +52,17 @@ public:
     static constexpr std::uint64_t kMostCells = std::uint64_t{1} << 21;  ///< 8 MiB
 
 private:
-    // R − √(R² − (ρ + d)²) by ρ², of a ball; every entry is that of the upper end of its bin.
-    struct BallTable {
-        double radius = 0, scale = 0;
+    // The under side's height at ρ + d by ρ², of what is no flat; every entry is that of the upper end of its
+    // bin.
+    struct HeightTable {
+        Cutter cutter;
+        double scale = 0;
         std::vector<float> height;
     };
     static double cell_size(std::array<double, 2> min, std::array<double, 2> max);
-    [[nodiscard]] BallTable made_table(double radius) const;
-    /// The table of this radius, made when it is first asked for; until the next call.
-    [[nodiscard]] const BallTable& ball_table(double radius) const;
+    [[nodiscard]] HeightTable made_table(const Cutter& cutter) const;
+    /// The table of this cutter, made when it is first asked for; until the next call.
+    [[nodiscard]] const HeightTable& table_of(const Cutter& cutter) const;
     template <class Spans>
     void each_spans(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, bool been,
                     Spans&& take) const;
@@ -71,7 +76,7 @@ private:
     double top_;                 // heights are kept relative to it
     int nx_, ny_;
     std::vector<float> height_;
-    mutable std::vector<BallTable> tables_;
+    mutable std::vector<HeightTable> tables_;
     std::vector<float> under_core_;  // heights that a cut does not change
     // Where a flat cutter went last, level: what it covers there is no higher.
     std::array<double, 3> last_{kUnbounded, kUnbounded, kUnbounded};

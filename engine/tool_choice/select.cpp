@@ -21,13 +21,17 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kSectionStep = 1;    // mm between the sections on which reach is measured
 constexpr double kFinestStep = 0.05;  // mm to which halving brings a stepdown
 
-std::vector<Tool> falling(const Job& job, ToolKind kind) {
+template <class Is>
+std::vector<Tool> falling(const Job& job, Is&& is) {
     std::vector<Tool> tools;
     for (const Tool& tool : job.tools)
-        if (tool.kind == kind) tools.push_back(tool);
+        if (is(tool.kind)) tools.push_back(tool);
     std::stable_sort(tools.begin(), tools.end(),
                      [](const Tool& a, const Tool& b) { return a.diameter > b.diameter; });
     return tools;
+}
+std::vector<Tool> falling(const Job& job, ToolKind kind) {
+    return falling(job, [&](ToolKind k) { return k == kind; });
 }
 
 // What the facets that are machined in a layer say of its slopes.
@@ -68,7 +72,7 @@ public:
           job_(*layer.job),
           ratio_(ratio),
           finish_(finish),
-          flats_(falling(job_, ToolKind::flat)),
+          flats_(falling(job_, roughs_layers)),
           balls_(falling(job_, ToolKind::ball)) {
         for (const Flat& flat : layer.flats) floors_.push_back(flat.z);
     }
@@ -87,7 +91,7 @@ public:
             choose_rough(slopes.least);
         }
         LayerTools& tools = choice_.tools;
-        tools.rest = rest_tools(job_, tools.rough.diameter, tools.finish.diameter);
+        tools.rest = rest_tools(job_, tools.rough, tools.finish.diameter);
         return std::move(choice_);
     }
 
@@ -108,7 +112,7 @@ public:
             LayerTools& tools = sets.emplace_back();
             tools.finish = base.finish;
             tools.rough = rough;
-            tools.rest = rest_tools(job_, rough.diameter, base.finish.diameter);
+            tools.rest = rest_tools(job_, rough, base.finish.diameter);
             if (left(rough, rough.stepdown_max, swath).nothing(job_.selection.voxel)) continue;
             for (Tool semi : flats_) {
                 if (semi.diameter >= rough.diameter - 1e-9) continue;
@@ -157,7 +161,10 @@ private:
     }
 
     void choose_one_flat() {
-        Tool flat = first_that_reaches(flats_, "rough", [](const Tool& t) { return t.stepdown_max; });
+        // A bull-nose leaves its corners at the foot of every wall: where there is a flat, that does it all.
+        const std::vector<Tool> sharp = falling(job_, ToolKind::flat);
+        Tool flat = first_that_reaches(sharp.empty() ? flats_ : sharp, "rough",
+                                       [](const Tool& t) { return t.stepdown_max; });
         flat.stepdown_min = flat.stepdown_max;
         choice_.record.candidates.back().reason +=
             "; every wall is upright, so it cuts all, at its largest stepdown";
@@ -372,7 +379,7 @@ private:
     const Job& job_;
     const ReachRatio ratio_;
     const std::optional<Tool> finish_;
-    std::vector<Tool> flats_, balls_;
+    std::vector<Tool> flats_, balls_;  // flats_: bull-noses too, which rough as the flats around them
     std::vector<double> floors_;
     std::optional<LayerVoxels> voxels_;
     std::vector<double> length_;  // of the sections, by slice of voxels
@@ -383,7 +390,7 @@ private:
 
 bool selects_tools(const Job& job) {
     return job.selection.mode == SelectionMode::select &&
-           (falling(job, ToolKind::flat).size() > 1 || falling(job, ToolKind::ball).size() > 1);
+           (falling(job, roughs_layers).size() > 1 || falling(job, ToolKind::ball).size() > 1);
 }
 
 Overrun overrun_of(const Job& job) {

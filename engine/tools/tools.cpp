@@ -19,6 +19,7 @@ bool stiffen(const Job& job, Tool& tool) {
     const Tool* stiffest = &tool;
     for (const Tool& other : job.tools)
         if (other.kind == tool.kind && std::abs(other.diameter - tool.diameter) < 1e-3 &&
+            std::abs(other.corner_radius - tool.corner_radius) < 1e-3 &&
             other.stickout < stiffest->stickout - 1e-9)
             stiffest = &other;
     if (stiffest == &tool) return false;
@@ -38,21 +39,33 @@ bool clears_on_contours(const Job& job) {
         return std::count_if(job.tools.begin(), job.tools.end(),
                              [&](const Tool& t) { return t.kind == kind; }) > 1;
     };
-    return several(ToolKind::flat) || several(ToolKind::ball);
+    const auto roughing = std::count_if(job.tools.begin(), job.tools.end(),
+                                        [](const Tool& t) { return roughs_layers(t.kind); });
+    return roughing > 1 || several(ToolKind::ball);
 }
 
 double least_slab(const Tool& tool) {
     return tool.stepdown_min > 0 ? tool.stepdown_min : tool.stepdown_max / 2;
 }
 
-std::vector<Tool> rest_tools(const Job& job, double rough_diameter, double finish_diameter) {
+std::vector<Tool> rest_tools(const Job& job, const Tool& rough, double finish_diameter) {
     // What a flat reaches at a corner a smaller one reaches too, and so it is with balls: the smallest of
     // either kind leave no more than all together.
+    constexpr double hair = 1e-9;
+    const bool is_flat = rough.kind == ToolKind::flat;
     std::vector<Tool> rest;
     for (const Tool& tool : job.tools)
-        if ((tool.kind == ToolKind::flat && tool.diameter < rough_diameter - 1e-9) ||
+        if ((tool.kind == ToolKind::flat && tool.diameter < rough.diameter + (is_flat ? -hair : hair)) ||
             (tool.kind == ToolKind::ball && tool.diameter < finish_diameter - 1e-9))
             rest.push_back(tool);
+    if (!is_flat && std::none_of(rest.begin(), rest.end(),
+                                 [](const Tool& tool) { return tool.kind == ToolKind::flat; })) {
+        const Tool* narrowest = nullptr;
+        for (const Tool& tool : job.tools)
+            if (tool.kind == ToolKind::flat && (narrowest == nullptr || tool.diameter < narrowest->diameter))
+                narrowest = &tool;
+        if (narrowest != nullptr) rest.push_back(*narrowest);
+    }
     std::stable_sort(rest.begin(), rest.end(), [](const Tool& a, const Tool& b) {
         return a.diameter != b.diameter ? a.diameter > b.diameter : a.kind < b.kind;
     });
@@ -70,9 +83,13 @@ std::optional<LayerTools> stiffer_tools(const Job& job, const LayerTools& tools)
 
 LayerTools fixed_tools(const Job& job) {
     LayerTools tools;
-    tools.rough = fixed_tool(job, ToolKind::flat, 0.5 * kInch);
+    const auto has = [&](ToolKind kind) {
+        return std::any_of(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.kind == kind; });
+    };
+    const bool bull_nose = !has(ToolKind::flat) && has(ToolKind::bull_nose);
+    tools.rough = fixed_tool(job, bull_nose ? ToolKind::bull_nose : ToolKind::flat, 0.5 * kInch);
     tools.finish = fixed_tool(job, ToolKind::ball, 0.25 * kInch);
-    tools.rest = rest_tools(job, tools.rough.diameter, tools.finish.diameter);
+    tools.rest = rest_tools(job, tools.rough, tools.finish.diameter);
     return tools;
 }
 

@@ -11,7 +11,8 @@ namespace slabwright {
 /// The tools of one layer. Each is a copy of the library's, with the stepdown that this layer allows it as
 /// stepdown_max.
 struct LayerTools {
-    Tool rough;  ///< flat: roughing, then floors, walls and the corners that the finish tool leaves
+    Tool rough;  ///< flat or bull-nose: roughing, then floors, walls and the corners that the finish tool
+                 ///< leaves
     std::vector<Tool>
         semi_rough;  ///< flat, none or one: level by level where the roughing cutter did not fit
     Tool finish;     ///< ball: slopes, and waste between walls before them
@@ -19,8 +20,9 @@ struct LayerTools {
         rest;  ///< flats and balls in falling size: only where something is left that they reach
 };
 
-/// The fixed set: the first flat and the first ball end mill of the job, LUO's 1/2 and 1/4 in where the
-/// library has them; for what these leave, the smaller tools of the library.
+/// The fixed set: the first flat (the first bull-nose where there is no flat) and the first ball end mill of
+/// the job, LUO's 1/2 and 1/4 in where the library has them; for what these leave, the smaller tools of the
+/// library.
 /// @throws Error(usage, "job.tool") when the library has no flat or no ball
 [[nodiscard]] LayerTools fixed_tools(const Job& job);
 
@@ -36,9 +38,10 @@ struct LayerTools {
 /// where no tool has one. Stepdowns stay.
 [[nodiscard]] std::optional<LayerTools> stiffer_tools(const Job& job, const LayerTools& tools);
 
-/// What follows a finish tool and a roughing tool (mm across) so that nothing is left which a tool of the
-/// library reaches: the smaller flats and balls of the library, in falling size. Only the smallest of either
-/// kind is sure to be used: those before it are where much is left.
-[[nodiscard]] std::vector<Tool> rest_tools(const Job& job, double rough_diameter, double finish_diameter);
+/// What follows a finish tool (mm across) and a roughing tool so that nothing is left which a tool of the
+/// library reaches: the smaller flats and balls of the library, in falling size; after a bull-nose also a
+/// flat that is no smaller, the largest of those no wider or else the narrowest of all, for what its corners
+/// leave. Only the smallest of either kind is sure to be used: those before it are where much is left.
+[[nodiscard]] std::vector<Tool> rest_tools(const Job& job, const Tool& rough, double finish_diameter);
 
 }  // namespace slabwright

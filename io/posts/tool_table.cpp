@@ -25,7 +25,12 @@ std::string tool_table(const Job& job, const std::vector<int>& magazine) {
         else if (!magazine.empty()) pocket = ++outside;
         text += fmt::format("T{} P{} D", tool->number, pocket);
         append_rounded(text, tool->diameter, 4);
-        text += fmt::format(" Z0 ;{}\n", comment_text(tool->name));
+        text += fmt::format(" Z0 ;{}", comment_text(tool->name));
+        if (tool->kind == ToolKind::bull_nose) {
+            text += tool->name.empty() ? "bull-nose R" : ", bull-nose R";
+            append_rounded(text, tool->corner_radius, 4);
+        }
+        text += '\n';
     }
     return text;
 }

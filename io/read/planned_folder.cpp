@@ -126,6 +126,10 @@ Tool read_tool(const Field& t) {
     if (t.has("strength_mpa")) tool.strength_mpa = t["strength_mpa"].number();
     if (t.has("core_diameter")) tool.core_diameter = t["core_diameter"].number();
     if (t.has("ramp_deg")) tool.ramp_deg = t["ramp_deg"].number();
+    if (t.has("corner_radius")) tool.corner_radius = t["corner_radius"].number();
+    if (tool.kind == ToolKind::bull_nose &&
+        !(tool.corner_radius > 0 && tool.corner_radius < tool.diameter / 2))
+        t["corner_radius"].fail("is no corner of a bull-nose");
     if (tool.core_diameter >= tool.diameter) t["core_diameter"].fail("is no less than the diameter");
     if (tool.ramp_deg > 90) t["ramp_deg"].fail("is no slope");
     return tool;

@@ -57,6 +57,20 @@ std::string text_of(const fs::path& path) {
     return read_whole(path, {ErrorKind::usage, "tools.", kMostToolTableBytes, "check the path of the tools"});
 }
 
+// A row's remark is the tool's name. Of a bull-nose it ends as tool_table() writes it: ", bull-nose R1.5".
+void add_remark(std::string_view remark, const std::string& place, LibraryTool& tool) {
+    constexpr std::string_view mark = "bull-nose R";
+    const std::size_t at = remark.rfind(mark);
+    double corner = 0;
+    if (at != std::string_view::npos && read_number(remark.substr(at + mark.size()), corner)) {
+        tool.values.emplace_back("kind", std::string("bull-nose"));
+        tool.values.emplace_back("corner_radius", number_in(remark.substr(at + mark.size()), place));
+        remark = trimmed(remark.substr(0, at));
+        if (!remark.empty() && remark.back() == ',') remark = trimmed(remark.substr(0, remark.size() - 1));
+    }
+    if (!remark.empty()) tool.values.emplace_back("name", std::string(remark));
+}
+
 // T and D of every row, and its remark. Pockets, offsets, angles and a lathe's words say nothing of a cutter.
 std::vector<LibraryTool> read_linuxcnc(const fs::path& path) {
     std::vector<LibraryTool> tools;
@@ -87,9 +101,7 @@ std::vector<LibraryTool> read_linuxcnc(const fs::path& path) {
         if (seen.empty()) return;
         if (seen.find('T') == std::string::npos)
             refuse("syntax", place, "a row without a tool's number", "begin the row with T and the number");
-        if (const std::string_view name = trimmed(row.substr(std::min(remark + 1, row.size())));
-            !name.empty())
-            tool.values.emplace_back("name", std::string(name));
+        add_remark(trimmed(row.substr(std::min(remark + 1, row.size()))), place, tool);
         tools.push_back(std::move(tool));
     });
     return tools;
@@ -234,7 +246,26 @@ const char* kind_of(const std::string& shape) {
     const std::string stem = fs::path(shape).stem().string();
     if (stem == "endmill") return "flat";
     if (stem == "ballend") return "ball";
+    if (stem == "bullnose" || stem == "torus") return "bull-nose";
     return stem == "drill" ? "drill" : nullptr;
+}
+
+// The corner of a bull-nose; until 2024 FreeCAD gave the radius of its floor instead.
+void add_corner(const FreecadFile& file, const json& given, LibraryTool& tool) {
+    const auto length = [&](const char* key) -> std::optional<double> {
+        const auto found = given.find(key);
+        if (found == given.end()) return std::nullopt;
+        return length_in(*found, key, file.place_of(key));
+    };
+    if (const auto corner = length("CornerRadius")) {
+        tool.values.emplace_back("corner_radius", *corner);
+        return;
+    }
+    const auto floor = length("FlatRadius"), diameter = length("Diameter");
+    if (!floor || !diameter)
+        refuse("shape", file.place_of("shape"), "a bull-nose without CornerRadius",
+               "give the bit a CornerRadius in FreeCAD");
+    tool.values.emplace_back("corner_radius", *diameter / 2 - *floor);
 }
 
 // FreeCAD's Length is the whole bit's, not what stands out of a holder: it states nothing here.
@@ -251,7 +282,7 @@ LibraryTool read_bit(const FreecadFile& file) {
         refuse("shape", file.place_of("shape"),
                fmt::format("a bit of the shape {} cannot be planned with",
                            quoted_word(fs::path(shape->get<std::string>()).stem().string())),
-               "name the tools to take in [tools] numbers; endmill, ballend and drill can be");
+               "name the tools to take in [tools] numbers; endmill, bullnose, ballend and drill can be");
     tool.values.emplace_back("kind", std::string(kind));
     const json none = json::object();
     const auto parameters = root.find("parameter");
@@ -261,6 +292,7 @@ LibraryTool read_bit(const FreecadFile& file) {
                                        {"ShankDiameter", "shank_diameter"}})
         if (const auto found = given.find(theirs); found != given.end())
             tool.values.emplace_back(ours, length_in(*found, theirs, file.place_of(theirs)));
+    if (kind_of("bullnose") == std::string(kind)) add_corner(file, given, tool);
     const auto attributes = root.find("attribute");
     for (const json* const table : {&given, attributes != root.end() ? &*attributes : &none}) {
         const auto flutes = table->is_object() ? table->find("Flutes") : table->end();

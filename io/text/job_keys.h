@@ -76,8 +76,11 @@ inline constexpr Word<AccessRule> kAccessWords[] = {
 inline constexpr Word<RoughLimit> kRoughLimitWords[] = {{"smaller", RoughLimit::smaller},
                                                         {"finish_radius", RoughLimit::finish_radius},
                                                         {"cusp", RoughLimit::cusp}};
-inline constexpr Word<ToolKind> kToolWords[] = {
-    {"flat", ToolKind::flat}, {"ball", ToolKind::ball}, {"face", ToolKind::face}, {"drill", ToolKind::drill}};
+inline constexpr Word<ToolKind> kToolWords[] = {{"flat", ToolKind::flat},
+                                                {"ball", ToolKind::ball},
+                                                {"face", ToolKind::face},
+                                                {"drill", ToolKind::drill},
+                                                {"bull-nose", ToolKind::bull_nose}};
 
 inline constexpr Word<KeepOutBase> kKeepOutWords[] = {{"board", KeepOutBase::board},
                                                       {"slab", KeepOutBase::slab}};
@@ -97,7 +100,7 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.required();
     visit.key("number", tool.number, "T number in the machine's magazine");
     visit.required();
-    visit.word("kind", tool.kind, kToolWords, "flat, ball, face or drill");
+    visit.word("kind", tool.kind, kToolWords, "flat, bull-nose, ball, face or drill");
     visit.key("name", tool.name, "for the operator");
     visit.required();
     visit.key("diameter", tool.diameter, "mm");
@@ -120,15 +123,18 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.key("stepover", tool.stepover, "share of the diameter, for clearing");
     visit.key("strength_mpa", tool.strength_mpa,
               "MPa, the cutter's own in bending, as its maker states it; 0: not checked");
+    visit.key("plunges", tool.plunges,
+              "cuts straight down into stock; when left out: true for ball and drill, false for the others");
     visit.key(
-        "plunges", tool.plunges,
-        "cuts straight down into stock; when left out: true for ball and drill, false for flat and face");
-    visit.key("core_diameter", tool.core_diameter,
-              "mm within which a flat or face mill has no edge; negative: 0 where it plunges, else 0.3 of a "
-              "flat's diameter and 0.8 of a face mill's");
-    visit.key("ramp_deg", tool.ramp_deg,
-              "degrees, steepest ramp into stock; negative: 10 of a flat, 2 of a face mill, any of what "
-              "plunges");
+        "core_diameter", tool.core_diameter,
+        "mm within which a flat, bull-nose or face mill has no edge; negative: 0 where it plunges, else "
+        "0.3 of a flat's or bull-nose's diameter and 0.8 of a face mill's");
+    visit.key(
+        "ramp_deg", tool.ramp_deg,
+        "degrees, steepest ramp into stock; negative: 10 of a flat or bull-nose, 2 of a face mill, any of "
+        "what plunges");
+    if (shows(visit, tool.kind == ToolKind::bull_nose))
+        visit.key("corner_radius", tool.corner_radius, "mm, of a bull-nose, between its floor and its side");
 }
 
 /// Walks the keys of one keep-out.

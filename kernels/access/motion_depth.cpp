@@ -65,6 +65,7 @@ private:
 struct Cutter {
     StandingPart::Form form;
     double radius, top;
+    double corner = 0;  ///< of a bull-nose
 
     [[nodiscard]] bool ball() const { return form == StandingPart::Form::ball; }
     /// What is asked of a motion is asked of so many pieces of it.
@@ -102,9 +103,32 @@ bool near(const Cutter& cutter, const Piece& piece, const Shape& shape, double h
     return piece.way.distance2(shape) + dz * dz < reach * reach;
 }
 
+/// As meet(). A bull-nose is what is no farther than its corner from its core, a cylinder that begins that
+/// much higher.
+void meet_bull_nose(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& facet,
+                    Penetration& result) {
+    const double corner = cutter.corner, disc = cutter.radius - corner;
+    Point3 a = piece.a, b = piece.b;
+    a[2] += corner, b[2] += corner;
+    below(facet, cutter.top, [&](const Triangle& t) {
+        if (result.depth < corner) {
+            const Closest c = disc_piece_distance(a, b, disc, t, corner - result.depth);
+            if (corner - c.d > result.depth) result = {corner - c.d, between(piece.a, piece.b, c.t), true};
+            if (c.d > 0) return;
+        }
+        Polygon poly;
+        poly.n = 3;
+        for (std::size_t k = 0; k < 3; ++k) poly.p[k] = t[k];
+        const Deepest d = piece_depth(a, b, poly, disc, result.depth - corner);
+        if (corner + d.depth > result.depth)
+            result = {corner + d.depth, between(piece.a, piece.b, d.t), true};
+    });
+}
+
 /// Raises the result by what one facet adds to it on one piece.
 void meet(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& facet, Penetration& result) {
     if (!near(cutter, piece, facet, std::max({facet[0].z, facet[1].z, facet[2].z}), result.depth)) return;
+    if (cutter.form == StandingPart::Form::bull_nose) return meet_bull_nose(cutter, piece, facet, result);
     if (cutter.ball()) {
         Point3 a = piece.a, b = piece.b;
         a[2] += cutter.radius;
@@ -166,9 +190,14 @@ Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point
     return depth_of(Form::cylinder, z_top, from, to, radius, at_least);
 }
 
+Penetration StandingPart::bull_nose(double z_top, const Point3& from, const Point3& to, double radius,
+                                    double corner, double at_least) const {
+    return depth_of(Form::bull_nose, z_top, from, to, radius, at_least, corner);
+}
+
 Penetration StandingPart::depth_of(Form form, double z_top, const Point3& from, const Point3& to,
-                                   double radius, double at_least) const {
-    const Cutter cutter{form, radius, z_top - kSheet};
+                                   double radius, double at_least, double corner) const {
+    const Cutter cutter{form, radius, z_top - kSheet, corner};
     return motion_depth(
         cutter, from, to, at_least, [&](const Point3& tip) { return covered(tip[0], tip[1], cutter.top); },
         [&](const Piece& piece, Penetration& result) {
@@ -465,11 +494,12 @@ bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Moti
 
 StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<const Motion> motions,
                                           double radius, double ignore, double tolerance,
-                                          std::atomic<double>* known, std::span<const Chords> chords) const {
+                                          std::atomic<double>* known, std::span<const Chords> chords,
+                                          double corner) const {
     Found found;
     Search search;
     if (form == Form::ball) search.arcs = chords;
-    const Cutter& cutter = search.cutter = {form, radius, z_top - kSheet};
+    const Cutter& cutter = search.cutter = {form, radius, z_top - kSheet, corner};
     std::vector<unsigned char>& keep = search.keep;
     Stretch stretch, single;
     bool whole = true;  // the stretch's facets are known

@@ -121,14 +121,75 @@ RayDistance ray_distance(const Point3& c, const Triangle& t) {
     return {std::sqrt(best), v};
 }
 
-Closest piece_distance(const Point3& a, const Point3& b, const Triangle& tri, double limit) {
+namespace {
+
+// From an edge to a disc about c and all above it.
+RayDistance disc_to_edge(const Point3& c, double disc, const Point3& a, const Point3& b) {
+    constexpr double bracket = 1e-8;  // mm
+    const Point3 e = minus(b, a), from_axis = minus(a, c);
+    const auto at = [&](double t) {
+        const double x = from_axis[0] + t * e[0], y = from_axis[1] + t * e[1],
+                     under = std::max(0.0, -(from_axis[2] + t * e[2])), r = std::sqrt(x * x + y * y),
+                     beside = std::max(0.0, r - disc), d = std::sqrt(beside * beside + under * under);
+        const double share = r > 0 ? beside / r : 0;
+        return RayDistance{d, {-x * share, -y * share, under}};
+    };
+    RayDistance best = at(0);
+    if (const RayDistance end = at(1); end.d < best.d) best = end;
+    double low = 0, high = 1;
+    for (int i = 0; i < 80; ++i) {
+        const double t = (low + high) / 2;
+        const RayDistance here = at(t);
+        if (here.d < best.d) best = here;
+        const double rise = here.d > 0 ? -dot(here.vector, e) / here.d : 0;
+        // A convex function stays over its tangent.
+        if (std::abs(rise) * (high - low) / 2 < bracket) break;
+        (rise > 0 ? high : low) = t;
+    }
+    return best;
+}
+
+RayDistance disc_distance(const Point3& c, double disc, const Triangle& t) {
+    const Point3 u = minus(t[1], t[0]), v = minus(t[2], t[0]);
+    Point3 n{u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+    const double area2 = std::sqrt(dot(n, n));
+    // Of a facet that is upright but for rounding the edges tell all: what is over the disc lies under one.
+    constexpr double upright = 1e-9;
+    if (area2 > 0 && std::abs(n[2]) > upright * area2) {
+        const double sign = n[2] > 0 ? 1 / area2 : -1 / area2;
+        for (double& k : n) k *= sign;
+        // Of the disc the place at its uphill rim is the nearest to the plane.
+        const double across = std::sqrt(n[0] * n[0] + n[1] * n[1]);
+        Point3 rim = c;
+        if (across > 0) rim[0] -= disc * n[0] / across, rim[1] -= disc * n[1] / across;
+        const double s = dot(n, minus(rim, t[0])), off = std::max(0.0, s);
+        Point3 foot{rim[0] - off * n[0], rim[1] - off * n[1], rim[2] - off * n[2]};
+        if (s < 0) foot[2] -= s / n[2];
+        bool left = false, right = false;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Point3 e = minus(t[(k + 1) % 3], t[k]), w = minus(foot, t[k]);
+            const Point3 cross{e[1] * w[2] - e[2] * w[1], e[2] * w[0] - e[0] * w[2],
+                               e[0] * w[1] - e[1] * w[0]};
+            const double side = dot(n, cross);
+            left |= side > 0, right |= side < 0;
+        }
+        if (!(left && right)) return {off, {off * n[0], off * n[1], off * n[2]}};
+    }
+    RayDistance best{kInfinity, {}};
+    for (std::size_t k = 0; k < 3; ++k)
+        if (const RayDistance d = disc_to_edge(c, disc, t[k], t[(k + 1) % 3]); d.d < best.d) best = d;
+    return best;
+}
+
+template <class Distance>
+Closest least_on_piece(const Point3& a, const Point3& b, double limit, Distance&& distance) {
     const Point3 along = minus(b, a);
     const double length = std::sqrt(dot(along, along));
     struct Sample {
         double t, d, g;
     };
     auto at = [&](double t) {
-        const RayDistance r = ray_distance(between(a, b, t), tri);
+        const RayDistance r = distance(between(a, b, t));
         return Sample{t, r.d, r.d > 0 ? dot(r.vector, along) / r.d : 0};
     };
     const Sample mid = at(0.5);
@@ -155,6 +216,17 @@ Closest piece_distance(const Point3& a, const Point3& b, const Triangle& tri, do
         (m.g > 0 ? r : l) = m;
     }
     return l.d <= r.d ? Closest{l.d, l.t} : Closest{r.d, r.t};
+}
+
+}  // namespace
+
+Closest piece_distance(const Point3& a, const Point3& b, const Triangle& tri, double limit) {
+    return least_on_piece(a, b, limit, [&](const Point3& c) { return ray_distance(c, tri); });
+}
+
+Closest disc_piece_distance(const Point3& a, const Point3& b, double disc, const Triangle& tri,
+                            double limit) {
+    return least_on_piece(a, b, limit, [&](const Point3& c) { return disc_distance(c, disc, tri); });
 }
 
 Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& tri, double radius, double best) {

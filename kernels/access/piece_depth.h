@@ -1,5 +1,5 @@
-// A straight piece of a motion against one facet: how near a ball's centre comes to what stands below it, and
-// how deep a cylinder goes in. Each is one convex problem. Internal to this folder.
+// A straight piece of a motion against one facet: how near a ball's centre, or a bull-nose's core, comes to
+// what stands below it, and how deep a cylinder goes in. Each is one convex problem. Internal to this folder.
 #pragma once
 
 #include <array>
@@ -58,6 +58,12 @@ struct Closest {
 };
 [[nodiscard]] Closest piece_distance(const Point3& a, const Point3& b, const Triangle& triangle,
                                      double limit);
+
+/// The same of a level disc with all that is above it, whose middle goes from a to b: a bull-nose of corner c
+/// is what is no farther than c from such a disc. Along an edge the distance is convex, and its least is
+/// bracketed to 1e-8 mm.
+[[nodiscard]] Closest disc_piece_distance(const Point3& a, const Point3& b, double disc,
+                                          const Triangle& triangle, double limit);
 
 /// Largest min(radius − r, z − tip) over a triangle and a piece of the tip's way, if above `best`.
 struct Deepest {

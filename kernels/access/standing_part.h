@@ -56,13 +56,18 @@ public:
     [[nodiscard]] Penetration cylinder(double z_top, const Point3& from, const Point3& to, double radius,
                                        double at_least) const;
 
+    /// The same for a bull-nose: an upright cylinder whose floor is rounded off at its rim by `corner`, which
+    /// is more than 0 and less than the radius, mm.
+    [[nodiscard]] Penetration bull_nose(double z_top, const Point3& from, const Point3& to, double radius,
+                                        double corner, double at_least) const;
+
     /// The same for a drill that stands with its point at `tip`: a cone under a cylinder of `radius`. Whoever
     /// went straight down to there was nowhere deeper in the part.
     /// @param taper_rad between the axis and the cone's flank
     [[nodiscard]] Penetration pointed(double z_top, const Point3& tip, double radius, double taper_rad,
                                       double at_least) const;
 
-    enum class Form : char { ball, cylinder };
+    enum class Form : char { ball, cylinder, bull_nose };
     struct Motion {
         Point3 from, to;
     };
@@ -88,9 +93,10 @@ public:
     ///        digits with what is known.)
     /// @param chords of the motions that run along circles, in their order: what is found is the same, but
     /// sooner
+    /// @param corner of a bull-nose, mm
     [[nodiscard]] Found deepest(Form form, double z_top, std::span<const Motion> motions, double radius,
                                 double ignore, double tolerance, std::atomic<double>* known = nullptr,
-                                std::span<const Chords> chords = {}) const;
+                                std::span<const Chords> chords = {}, double corner = 0) const;
 
     /// Whether there is part just under the plane z at (x, y).
     [[nodiscard]] bool covered(double x, double y, double z) const;
@@ -213,7 +219,7 @@ private:
     bool stretch_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m,
                       double depth) const;
     [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to,
-                                       double radius, double at_least) const;
+                                       double radius, double at_least, double corner = 0) const;
     friend class RisingEnvelope;
     Facets facets_;  ///< in Morton order
     std::vector<BulkVector<Nodes>>

@@ -3,6 +3,7 @@
 namespace slabwright {
 
 Cutter cutter_of(const CutterShape& shape) {
+    (void)under_side(shape);  // refuses measures that make no cutter
     switch (shape.form()) {
         case CutterForm::flat:
             return {Cutter::Profile::flat, shape.radius};
@@ -13,7 +14,12 @@ Cutter cutter_of(const CutterShape& shape) {
         case CutterForm::cone:
             break;
     }
-    refuse_form(shape.form(), "where it may go");
+    return {Cutter::Profile::other, shape.radius, shape.corner, shape.taper_rad};
+}
+
+Envelope under_side(const Cutter& cutter) {
+    const double corner = cutter.profile == Cutter::Profile::ball ? cutter.radius : cutter.corner;
+    return under_side(CutterShape{cutter.radius, corner, cutter.taper_rad});
 }
 
 }  // namespace slabwright

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "kernels/cutting/revolved.h"
 #include "kernels/errors.h"
 
 namespace slabwright {
@@ -125,9 +126,9 @@ float rounded_down(double v) {
 
 // The contact that lifts the cutter most, if that is above what it begins with. @param enough mm: the first
 // one above that will do
-template <bool ball>
-void search(const LayerSolid& solid, const DropProbe& probe, double r, double x, double y, double enough,
-            Best& best) {
+/// @param meet raises `best` by what a facet lifts the cutter to
+template <bool ball, class Found, class Meet>
+void search(const LayerSolid& solid, const DropProbe& probe, double enough, Found& best, Meet&& meet) {
     struct Waiting {
         float bound;
         std::uint32_t level, node;
@@ -169,8 +170,7 @@ void search(const LayerSolid& solid, const DropProbe& probe, double r, double x,
             while (n-- > 0 && bounds[order[n]] > least) {
                 const SolidFacet& f = solid.facets[facets[order[n]]];
                 const double before = best.tip_z;
-                if (ball) drop_ball(f, r, x, y, best);
-                else drop_flat(f, r, x, y, best);
+                meet(f);
                 if (best.tip_z > enough) return;
                 if (best.tip_z > before) least = rounded_down(best.tip_z);
             }
@@ -181,15 +181,38 @@ void search(const LayerSolid& solid, const DropProbe& probe, double r, double x,
     }
 }
 
+// The same for a cutter that is neither. Its tip rests no higher than that of the flat cutter around it,
+// whose bounds serve.
+void search_other(const LayerSolid& solid, const DropProbe& probe, const Envelope& under, double x, double y,
+                  double enough, double kept_up, Best& best, MetPoints* met) {
+    RevolvedContact contact{std::max(kept_up, best.tip_z), {}, 0, 0, 0};
+    const auto found_over = [&](double from) {
+        contact.tip_z = from;
+        search<false>(solid, probe, enough, contact,
+                      [&](const SolidFacet& f) { drop_revolved(f, under, x, y, contact); });
+        return contact.tip_z > from;
+    };
+    const double above = best.tip_z;
+    if (!(kept_up > above && found_over(kept_up)) && !found_over(above)) return;
+    best.offer(contact.tip_z, contact.nz, contact.nx, contact.ny);
+    if (met != nullptr) met->add(contact.point);
+}
+
 // The same, and what was met there before spares most of it; `best` begins with what need not be found.
 void search(const LayerSolid& solid, const DropProbe& probe, const Cutter& cutter, double x, double y,
             double enough, double kept_up, Best& best, MetPoints* met) {
+    if (cutter.profile == Cutter::Profile::other)
+        return search_other(solid, probe, under_side(cutter), x, y, enough, kept_up, best, met);
     const double above = best.tip_z, r = cutter.radius;
     const bool ball = cutter.profile == Cutter::Profile::ball;
     auto found_over = [&](double from) {
         best.tip_z = from;
-        if (ball) search<true>(solid, probe, r, x, y, enough, best);
-        else search<false>(solid, probe, r, x, y, enough, best);
+        if (ball)
+            search<true>(solid, probe, enough, best,
+                         [&](const SolidFacet& f) { drop_ball(f, r, x, y, best); });
+        else
+            search<false>(solid, probe, enough, best,
+                          [&](const SolidFacet& f) { drop_flat(f, r, x, y, best); });
         return best.tip_z > from;
     };
     if (!(kept_up > above && found_over(kept_up)) && !found_over(above)) return;
@@ -201,6 +224,15 @@ void search(const LayerSolid& solid, const DropProbe& probe, const Cutter& cutte
 }  // namespace
 
 double MetPoints::keep_up(const Cutter& cutter, double x, double y) const {
+    if (cutter.profile == Cutter::Profile::other) {
+        const Envelope under = under_side(cutter);
+        double most = -kNoEnd;
+        for (const Vec3d& p : points_) {
+            const double distance = std::hypot(x - p[0], y - p[1]) + kSurely;
+            if (distance < cutter.radius) most = std::max(most, p[2] - under.height(distance));
+        }
+        return most - kSurely;
+    }
     const double reach = cutter.radius - kSurely;
     double most = -kNoEnd;
     for (const Vec3d& p : points_) {
@@ -217,6 +249,7 @@ DropIndex::DropIndex(const LayerSolid& solid, const Cutter& cutter) : solid_(sol
     if (!(cutter.radius > 0 && cutter.radius <= FacetTree::kWidestCutter))
         throw Error(ErrorKind::usage, "drop.radius", "a cutter's radius is not between 0 and 1 m", "cutter",
                     "correct the tool's diameter");
+    if (cutter.profile == Cutter::Profile::other) (void)under_side(cutter);
     const double unit = solid.tree.unit, r = cutter.radius;
     probe_.radius = static_cast<float>(r / unit);
     probe_.unit = static_cast<float>(unit);
@@ -255,9 +288,9 @@ std::optional<Rest> DropIndex::drop_within(double x, double y, double above, dou
         best.tip_z = above;
         search(solid_, probe_at(x, y), cutter_, x, y, most, kept_up, best, met);
         if (best.tip_z > above) {
-            const bool ball = cutter_.profile == Cutter::Profile::ball;
-            rest = {best.tip_z, ball ? static_cast<float>(best.x) : 0.0F,
-                    ball ? static_cast<float>(best.y) : 0.0F, static_cast<float>(best.nz), false};
+            const bool has_normal = cutter_.profile != Cutter::Profile::flat;
+            rest = {best.tip_z, has_normal ? static_cast<float>(best.x) : 0.0F,
+                    has_normal ? static_cast<float>(best.y) : 0.0F, static_cast<float>(best.nz), false};
         }
     }
     if (rest.tip_z > most) return std::nullopt;

@@ -1,4 +1,5 @@
-// Dropping a ball onto the layer's solid: how low its tip may go over a point (the cutter-location surface).
+// Dropping a cutter onto the layer's solid: how low its tip may go over a point (the cutter-location
+// surface).
 #pragma once
 
 #include <array>
@@ -14,10 +15,10 @@ namespace slabwright {
 /// Where a dropped cutter comes to rest.
 struct Rest {
     double tip_z = 0;      ///< mm; −infinity where nothing is in reach
-    float nx = 0, ny = 0;  ///< the unit normal at the contact (a flat cutter gives nz only)
+    float nx = 0, ny = 0;  ///< the unit normal at the contact (of a level floor nz only)
     float nz = 0;          ///< its upward part
     bool on_cap = false;   ///< it rests on the layer's flat top
-    /// Height of the contact.
+    /// Height of a ball's contact.
     [[nodiscard]] double contact_z(double radius) const { return tip_z + radius * (1 - nz); }
 };
 
@@ -47,7 +48,8 @@ private:
 /// points for, and adds to them, makes it sooner done and changes nothing else.
 class DropIndex {
 public:
-    /// @throws Error(usage, "drop.radius") for a radius that is not positive or over FacetTree::kWidestCutter
+    /// @throws Error(usage, "tool.shape") as under_side(); Error(usage, "drop.radius") for a radius that is
+    /// not positive or over FacetTree::kWidestCutter
     DropIndex(const LayerSolid& solid, const Cutter& cutter);
     /// Exact over facets, edges and vertices (for a flat cutter over their shadow, tip on the highest of
     /// them). Of contacts that are equally high the one is given that the solid's tree leads to first.

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "kernels/cutting/fibre_rows.h"
+#include "kernels/cutting/revolved_fibres.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -1003,6 +1004,8 @@ Plane inside_plane(const LayerSolid& solid, const Cutter& cutter, double tip_z) 
 
 std::vector<Fibres> fibres(Context& context, const LayerSolid& solid, std::span<const FibreLevel> levels,
                            const Cutter& cutter, Axis axis, std::span<const std::int32_t> lines) {
+    if (cutter.profile == Cutter::Profile::other)
+        return revolved_fibres(context, solid, levels, cutter, axis, lines);
     return axis == Axis::x ? fibres_along<0, 1>(context, solid, levels, cutter, lines)
                            : fibres_along<1, 0>(context, solid, levels, cutter, lines);
 }

@@ -83,6 +83,15 @@ double Envelope::slope(double distance) const {
     return sin_taper > 0 ? cos_taper / sin_taper : std::numeric_limits<double>::infinity();
 }
 
+double Envelope::width(double height) const {
+    const double over = height - low;
+    if (!(over >= 0)) return -1;
+    const double top_of_rounding = rounding * (1 - sin_taper);
+    if (over < top_of_rounding) return core + std::sqrt(over * (2 * rounding - over));
+    if (sin_taper <= 0) return radius;
+    return std::min(radius, core + rounding * cos_taper + (over - top_of_rounding) * sin_taper / cos_taper);
+}
+
 // Depth is the distance from the surface: the rounding shrinks, and once it is used up the disc does. Where a
 // flank stands on a disc, its offset meets the raised floor nearer to the axis.
 Envelope Envelope::eroded(double depth) const {
@@ -102,6 +111,25 @@ Envelope Envelope::eroded(double depth) const {
         }
     }
     return e;
+}
+
+Envelope under_side(const CutterShape& cutter) {
+    const bool has_sense = std::isfinite(cutter.radius) && cutter.radius > 0 && cutter.corner >= 0 &&
+                           cutter.corner <= cutter.radius && cutter.taper_rad >= 0 &&
+                           cutter.taper_rad < std::numbers::pi / 2;
+    if (!has_sense)
+        throw Error(ErrorKind::usage, "tool.shape", "radius, corner and taper make no cutter", "tool shape",
+                    "correct the tool's measures");
+    Envelope under;
+    under.radius = cutter.radius;
+    under.rounding = cutter.corner;
+    if (cutter.taper_rad > 0) {
+        under.sin_taper = std::sin(cutter.taper_rad);
+        under.cos_taper = std::cos(cutter.taper_rad);
+    } else {
+        under.core = cutter.radius - cutter.corner;
+    }
+    return under;
 }
 
 std::vector<Envelope> envelopes(const ToolShape& tool) {

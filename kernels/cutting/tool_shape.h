@@ -47,10 +47,18 @@ struct Envelope {
     [[nodiscard]] double height(double distance) const;
     /// Its derivative by the distance.
     [[nodiscard]] double slope(double distance) const;
+    /// The inverse of height(): the distance from the axis within which the under side is no higher than
+    /// `height` over the tip, mm; negative where it is higher everywhere.
+    [[nodiscard]] double width(double height) const;
     /// What is deeper in the tool than `depth`, mm: that part's under side. Its radius is negative when
     /// nothing is.
     [[nodiscard]] Envelope eroded(double depth) const;
 };
+
+/// The under side of a cutter of any form, without shank and holder.
+/// @throws Error(usage, "tool.shape") for a radius that is not positive, a corner larger than the cutter or a
+/// taper outside [0°, 90°)
+[[nodiscard]] Envelope under_side(const CutterShape& cutter);
 
 /// The cutter's under side first, then those of shank and holder where they stand out over what is below
 /// them.

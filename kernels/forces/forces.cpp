@@ -14,11 +14,26 @@ CutterProfile cutter_profile(const CutterShape& shape) {
         case CutterForm::ball:
             return CutterProfile::ball;
         case CutterForm::bull_nose:
+            return CutterProfile::bull_nose;
         case CutterForm::tapered_ball:
         case CutterForm::cone:
             break;
     }
     refuse_form(shape.form(), "the force");
+}
+
+double radius_at(const CutSegment& s, double height_mm) {
+    const double r = s.radius_mm, corner = s.corner_mm;
+    switch (s.profile) {
+        case CutterProfile::flat:
+            break;
+        case CutterProfile::ball:
+            return height_mm < r ? std::sqrt(height_mm * (2 * r - height_mm)) : r;
+        case CutterProfile::bull_nose:
+            if (height_mm < corner) return r - corner + std::sqrt(height_mm * (2 * corner - height_mm));
+            break;
+    }
+    return r;
 }
 
 ForceCoefficients resolve_coefficients(const OrthogonalForces& k, double helix,

@@ -1,11 +1,11 @@
 // What a milling cut does to cutter and wood (LUO 6.2, 6.5.1; METHOD.md section 8): the edge-force model of
-// Altintas for flat and ball end mills, for one cut in double precision and for any number of cuts on an
-// OpenCL device.
+// Altintas for flat, bull-nose and ball end mills, for one cut in double precision and for any number of cuts
+// on an OpenCL device.
 //
 // Angles are those of the tooth: 0 where up milling enters, π/2 in the direction of feed, π where down
 // milling leaves. At the height z above the tip a tooth lags by z·tan(helix)/R. On the disc dz at the edge's
-// slope κ (90° on a flat end mill and on a ball's shank; sin κ = r(z)/R on the ball), db = dz/sin κ of edge
-// cuts a chip h = c·sin φ·sin κ thick, with
+// slope κ (90° on a flat end mill and on a ball's shank; sin κ = r(z)/R on the ball, and likewise on a
+// bull-nose's corner), db = dz/sin κ of edge cuts a chip h = c·sin φ·sin κ thick, with
 //     dFt = (Ktc·h + Kte)·db,  dFr = (Krc·h + Kre)·db,  dFa = (Kac·h + Kae)·db,
 //     dFx = −dFt·cos φ − (dFr·sin κ + dFa·cos κ)·sin φ,
 //     dFy = +dFt·sin φ − (dFr·sin κ + dFa·cos κ)·cos φ,
@@ -32,8 +32,8 @@
 
 namespace slabwright {
 
-enum class CutterProfile : std::uint8_t { flat, ball };
-/// @throws Error(usage, "tool.shape") for what is neither flat nor a ball
+enum class CutterProfile : std::uint8_t { flat, ball, bull_nose };
+/// @throws Error(usage, "tool.shape") for a tapered ball or a cone
 [[nodiscard]] CutterProfile cutter_profile(const CutterShape& shape);
 
 /// What a material gives in orthogonal cutting: c, per area of chip, N/mm²; e, per length of edge, N/mm.
@@ -72,6 +72,7 @@ struct CutSegment {
     CutterProfile profile = CutterProfile::flat;
     int flutes = 2;        ///< 1 … 32
     double radius_mm = 0;  ///< of the cutter
+    double corner_mm = 0;  ///< of a bull-nose, more than 0 and at most its radius
     double helix_rad = 0;  ///< 0 … 60°
     double low_mm = 0,
            high_mm =
@@ -81,6 +82,9 @@ struct CutSegment {
     double spindle_rpm = 0;   ///< for power; 0: power is 0
     ForceCoefficients coefficients;
 };
+
+/// The cutter's radius at a height above its tip, mm: what it cuts across there.
+[[nodiscard]] double radius_at(const CutSegment& segment, double height_mm);
 
 /// Over one turn. Peaks are of the magnitude, means are signed and exact; the resultant's mean is of its
 /// magnitude, by the samples that the peaks are taken from.
@@ -104,7 +108,7 @@ inline constexpr double kForceAccuracy = 1e-3;
 [[nodiscard]] SegmentForces reference_forces(const CutSegment& segment, double accuracy = kForceAccuracy);
 
 /// The same for a flat end mill, whose integral over z is elementary.
-/// @throws Error(usage, "forces.segment") also for a ball
+/// @throws Error(usage, "forces.segment") also for a ball or a bull-nose
 [[nodiscard]] SegmentForces closed_form_forces(const CutSegment& segment, double accuracy = kForceAccuracy);
 
 /// What a plan states about a cut.
@@ -116,11 +120,12 @@ struct CutForce {
     double peak_in_plane_n = 0;
 };
 
-/// From the closed form (flat) or the reference (ball): the same digits on every device.
+/// From the closed form (flat) or the reference (others): the same digits on every device.
 /// @param accuracy share of themselves to which peaks are found; time grows as one over its root
 [[nodiscard]] CutForce peak_force(const CutSegment& segment, double accuracy = 1e-5);
 
-/// Forces of many cuts, on an OpenCL device where there is one that passes a self-test, else by reference and
+/// Forces of many cuts, on an OpenCL device where there is one that passes a self-test and the cutter is no
+/// bull-nose, else by reference and
 /// closed form on the context's threads. The device's single precision differs from the reference by less
 /// than 1e-4 of a segment's peak resultant; what must not depend on the machine is decided by peak_force.
 class ForceSolver {

@@ -43,7 +43,7 @@ SolverAhead::~SolverAhead() {
 
 void SolverAhead::expect(std::span<const CutSegment> cuts) {
     const auto balls = static_cast<std::uint64_t>(std::count_if(
-        cuts.begin(), cuts.end(), [](const CutSegment& cut) { return cut.profile == CutterProfile::ball; }));
+        cuts.begin(), cuts.end(), [](const CutSegment& cut) { return cut.profile != CutterProfile::flat; }));
     const std::lock_guard lock(mutex_);
     balls_ += balls;
     flats_ += cuts.size() - balls;

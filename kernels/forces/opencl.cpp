@@ -380,9 +380,12 @@ void ForceSolver::solve(Context& context, std::span<const CutSegment> segments, 
     if (out.size() != segments.size())
         throw Error(ErrorKind::usage, "forces.segment", "there must be as many forces as segments",
                     std::to_string(out.size()));
-    if (impl_->runner) return impl_->runner->solve(context, segments, out, accuracy);
+    const bool on_device = impl_->runner != nullptr;
+    if (on_device) impl_->runner->solve(context, segments, out, accuracy);
     parallel_for(context, segments.size(), 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
+            // The device knows flats and balls.
+            if (on_device && segments[i].profile != CutterProfile::bull_nose) continue;
             forces::check_segment(segments[i], i);
             out[i] = double_forces(segments[i], accuracy);
         }

@@ -1,7 +1,7 @@
 // The double reference: equations 1 and 2 of LUO as forces.h states them, integrated along the engaged part
-// of every tooth by Gauss's rule. On the ball the variable is q = sin(κ/2), z = 2Rq²: the edge is smooth in
-// it at the tip, where it is not in z. Panels of at most a quarter radian of lag leave the eight-point rule
-// an error below the last digits.
+// of every tooth by Gauss's rule. On the ball, and on a bull-nose's corner, the variable is q = sin(κ/2), z =
+// 2Rq²: the edge is smooth in it at the tip, where it is not in z. Panels of at most a quarter radian of lag
+// leave the eight-point rule an error below the last digits.
 #include "kernels/errors.h"
 #include "kernels/forces/turn.h"
 
@@ -32,7 +32,8 @@ SegmentForces reference_forces(const CutSegment& s, double accuracy) {
     const forces::Turn turn = forces::make_turn(s);
     if (turn.count == 0) return {};
     const ForceCoefficients& k = s.coefficients;
-    const double r = s.radius_mm, c = s.chip_load_mm, lag = turn.lag_per_mm;
+    const forces::Rounding rounding = forces::rounding_of(s);
+    const double r = rounding.radius, disc = rounding.disc, c = s.chip_load_mm, lag = turn.lag_per_mm;
     forces::Instant f;
     // Adds db of edge at slope κ; `turn_of_tooth` is the tooth's angle at the tip.
     auto add = [&](double turn_of_tooth, double z, double sin_k, double cos_k, double db) {
@@ -44,12 +45,12 @@ SegmentForces reference_forces(const CutSegment& s, double accuracy) {
         f.x += -ft * cos_phi - inward * sin_phi;
         f.y += ft * sin_phi - inward * cos_phi;
         f.z += fa * sin_k - fr * cos_k;
-        f.torque += ft * r * sin_k;
+        f.torque += ft * r * sin_k + ft * disc;
     };
     return forces::sweep_turn(s, turn, accuracy, [&](const forces::Heights& heights, double u) {
         f = {};
         if (heights.high <= heights.low) return f;
-        const double ball_top = s.profile == CutterProfile::ball ? std::min(r, heights.high) : 0,
+        const double ball_top = rounding.has ? std::min(r, heights.high) : 0,
                      shank = std::max(ball_top, heights.low);
         auto panels = [&](double length) {
             return std::max(1, static_cast<int>(std::ceil(length * lag * 4)));

@@ -24,6 +24,8 @@ void check_segment(const CutSegment& s, std::size_t index) {
     // Written so that NaN fails every test.
     if (s.flutes < 1 || s.flutes > 32) refuse("the number of flutes is not in 1 … 32", index);
     if (!(s.radius_mm > 0 && s.radius_mm <= 1e4)) refuse("the cutter's radius is not positive", index);
+    if (s.profile == CutterProfile::bull_nose && !(s.corner_mm > 0 && s.corner_mm <= s.radius_mm))
+        refuse("the corner is not between 0 and the cutter's radius", index);
     if (!(s.helix_rad >= 0 && s.helix_rad <= std::numbers::pi / 3 + 1e-12))
         refuse("the helix angle is not in 0 … 60°", index);
     if (!(s.low_mm >= 0 && s.high_mm >= s.low_mm && s.high_mm <= 64 * s.radius_mm))
@@ -62,11 +64,12 @@ Turn make_turn(const CutSegment& s) {
 
 void set_means(const CutSegment& s, const Turn& t, SegmentForces& out) {
     const ForceCoefficients& k = s.coefficients;
-    const double r = s.radius_mm, tc = k.ktc * s.chip_load_mm, rc = k.krc * s.chip_load_mm,
-                 ac = k.kac * s.chip_load_mm;
+    const Rounding rounding = rounding_of(s);
+    const double r = rounding.radius, disc = rounding.disc, tc = k.ktc * s.chip_load_mm,
+                 rc = k.krc * s.chip_load_mm, ac = k.kac * s.chip_load_mm;
     // Over the edge: of 1, sin κ, sin²κ, cos κ and sin κ·cos κ.
     double e0 = 0, e1 = 0, e2 = 0, g0 = 0, g1 = 0, shank = t.low;
-    if (s.profile == CutterProfile::ball && t.low < r) {
+    if (rounding.has && t.low < r) {
         shank = std::min(r, t.high);
         const double c0 = 1 - t.low / r, c1 = 1 - shank / r, s0 = std::sqrt(1 - c0 * c0),
                      s1 = std::sqrt(1 - c1 * c1);
@@ -86,7 +89,7 @@ void set_means(const CutSegment& s, const Turn& t, SegmentForces& out) {
     out.mean_y_n =
         (tc * e1 * a2 + k.kte * e0 * a1) - (rc * e2 + ac * g1) * ab - (k.kre * e1 + k.kae * g0) * b1;
     out.mean_z_n = (ac * e2 - rc * g1) * a1 + (k.kae * e1 - k.kre * g0) * a0;
-    out.mean_torque_nmm = r * (tc * e2 * a1 + k.kte * e1 * a0);
+    out.mean_torque_nmm = r * (tc * e2 * a1 + k.kte * e1 * a0) + disc * (tc * e1 * a1 + k.kte * e0 * a0);
     out.mean_power_w = out.mean_torque_nmm * watts_per_nmm(s.spindle_rpm);
 }
 

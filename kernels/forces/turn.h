@@ -35,6 +35,17 @@ struct Turn {
     int count = 0;
 };
 
+/// A cutter's rounding, below its upright side: the edge runs at disc + radius·sin κ from the axis. Without
+/// one the radius is the cutter's.
+struct Rounding {
+    bool has = false;
+    double radius = 0, disc = 0;  ///< mm
+};
+[[nodiscard]] inline Rounding rounding_of(const CutSegment& s) {
+    if (s.profile == CutterProfile::bull_nose) return {true, s.corner_mm, s.radius_mm - s.corner_mm};
+    return {s.profile == CutterProfile::ball, s.radius_mm, 0};
+}
+
 /// @throws Error(usage, "forces.segment") for a segment out of range; `index` names it
 void check_segment(const CutSegment& segment, std::size_t index);
 

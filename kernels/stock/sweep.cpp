@@ -22,7 +22,28 @@ CutterEnd cutter_end(const CutterShape& shape) {
         case CutterForm::tapered_ball:
             break;
     }
-    refuse_form(shape.form(), "what it takes off the stock");
+    return {CutterEnd::Form::other, shape.radius, 0, under_side(shape)};
+}
+
+double least_height(const Envelope& under, double slope, double foot, double aside2, double low,
+                    double high) {
+    const auto distance = [&](double s) {
+        return std::min(under.radius, std::sqrt(aside2 + (s - foot) * (s - foot)));
+    };
+    const auto height = [&](double s) { return slope * s + under.height(distance(s)); };
+    if (slope == 0) return height(std::clamp(foot, low, high));
+    constexpr double bracket = 1e-9;  // mm: of the height
+    double least = std::min(height(low), height(high));
+    // Convex along the way, so that a tangent is under it.
+    for (int i = 0; i < 80; ++i) {
+        const double s = (low + high) / 2, d = distance(s), off = s - foot;
+        const double h = height(s), rise = d > 0 && off != 0 ? slope + under.slope(d) * off / d : slope;
+        least = std::min(least, h);
+        const double room = std::abs(rise) * (high - low) / 2;
+        if (rise == 0 || room < bracket) break;
+        (rise > 0 ? high : low) = s;
+    }
+    return least;
 }
 
 namespace {

@@ -13,6 +13,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "kernels/cutting/tool_shape.h"
 #include "kernels/geometry/cutter_shape.h"
 #include "kernels/geometry/vectors.h"
 
@@ -33,15 +34,16 @@ struct CellGrid {
     }
 };
 
-/// The lower end of a cutter: height over its tip at radius r is 0 (flat and face), R − √(R² − r²) (ball) or
-/// r·slope (drill).
+/// The lower end of a cutter: height over its tip at radius r is 0 (flat and face), R − √(R² − r²) (ball),
+/// r·slope (drill) or the under side's (bull-nose, tapered ball).
 struct CutterEnd {
-    enum class Form : std::uint8_t { flat, ball, cone } form = Form::flat;
+    enum class Form : std::uint8_t { flat, ball, cone, other } form = Form::flat;
     double radius = 0;  ///< mm
     double slope = 0;   ///< of the cone
+    Envelope under{};   ///< of what is none of these
 };
 
-/// @throws Error(usage, "tool.shape") for a bull-nose or a tapered ball
+/// @throws Error(usage, "tool.shape") for measures that make no cutter
 [[nodiscard]] CutterEnd cutter_end(const CutterShape& shape);
 
 /// A part of a circle at one height that the tip runs along, mm and radians: from the angle `start` (from +x,
@@ -164,6 +166,12 @@ bool keep_lower(const float* stands, double bottom, int n, double* h);
                                        int n, float most);
 /// The most that is left of any of n cells, as cells_left() compares it; 0 at least.
 [[nodiscard]] float most_left(const float* stands, const float* surface, const std::uint8_t* nz, int n);
+
+/// The least height of an under side over a centre, mm, as its axis goes along a way of a slope: `foot` is
+/// the centre's place on the way and `aside2` the square of its distance from it; heights are over the tip at
+/// place 0. @param low, high of the places at which the cutter covers the centre
+[[nodiscard]] double least_height(const Envelope& under, double slope, double foot, double aside2, double low,
+                                  double high);
 
 /// The cells of some rows that a level disc comes over on its way, but for those that it has been over where
 /// it starts: [low, left] and [right, high] along each row; low > left, right > high: none.
@@ -438,13 +446,18 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
             if (w2 < 0) return;
             const double w = std::sqrt(w2), s_low = std::max(0.0, s0 - w), s_high = std::min(run, s0 + w);
             if (s_low > s_high) return;
+            if (end.form == Form::other) {
+                const double height = z + least_height(end.under, slope, s0, q2, s_low, s_high);
+                if (stands > height) fn(cell, height);
+                return;
+            }
             double s = slope >= 0 ? s_low : s_high;
             if (end.slope > std::abs(slope)) s = std::clamp(s0 - std::sqrt(q2) * cone_lead, s_low, s_high);
             const double height = end.slope * std::sqrt(q2 + (s - s0) * (s - s0)) + (z + slope * s);
             if (stands > height) fn(cell, height);
         };
         auto together = [&](int left, int right) {
-            if (end.form == Form::cone) {
+            if (end.form == Form::cone || end.form == Form::other) {
                 cells(row, left, right, one);
                 return;
             }
@@ -610,6 +623,7 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const LevelArc& arc
             double height = arc.z;
             if (end.form == CutterEnd::Form::ball) height += R - std::sqrt(R2 - distance2);
             else if (end.form == CutterEnd::Form::cone) height += end.slope * std::sqrt(distance2);
+            else if (end.form == CutterEnd::Form::other) height += end.under.height(std::sqrt(distance2));
             if (stands > height) fn(cell, height);
         }
     }

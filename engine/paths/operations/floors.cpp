@@ -26,7 +26,7 @@ Operation finish_floors(const LayerCut& cut) {
                      cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     const DropIndex& part = cut.drops(cutter);
     path.set_surroundings(cut.around(tool, &part));
-    op.stepover = tool.stepover * tool.diameter;
+    op.stepover = clearing_step(tool);
     for (std::size_t i = 0; i < heights.size(); ++i) {
         const std::vector<SolidFacet> facets = floor_facets(cut, heights[i]);
         double y_low = kUnbounded, y_high = -kUnbounded;

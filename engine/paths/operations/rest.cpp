@@ -296,6 +296,9 @@ private:
                 const double dx = grid.x(i) - x, dy = grid.y(j) - y,
                              from_axis = std::max(0.0, std::sqrt(dx * dx + dy * dy) - slack);
                 z += core - std::sqrt(std::max(0.0, core * core - from_axis * from_axis));
+            } else if (end_.form == CutterEnd::Form::other) {
+                const double from_axis = std::max(0.0, std::hypot(grid.x(i) - x, grid.y(j) - y) - slack);
+                z += end_.under.height(std::min(r_, from_axis));
             }
             z = std::max(z, static_cast<double>(stock_.surface(c)));
             return (stock_.height(c) - z) * stock_.nz(c) > worth(c);

@@ -175,7 +175,7 @@ std::vector<Operation> rough_layer(const LayerCut& cut) {
 
     // Lines from edge to edge of the stock, evenly spaced.
     const double depth = cut.layer.stock_max[1] - cut.layer.stock_min[1];
-    const int gaps = std::max(1, static_cast<int>(std::ceil(depth / (tool.stepover * tool.diameter) - 1e-9)));
+    const int gaps = std::max(1, static_cast<int>(std::ceil(depth / clearing_step(tool) - 1e-9)));
     std::vector<std::int32_t> lines;
     for (int k = 0; k <= gaps; ++k) lines.push_back(to_units(cut.layer.stock_min[1] + depth * k / gaps));
     // Contours of the border may be coarser than a finish pass: what their chords miss must stay well inside

@@ -72,7 +72,7 @@ public:
     LevelTargets(Context& context, const LayerStock& stock, double limit, const Tool& tool)
         : stock_(stock),
           limit_(limit),
-          radius_(tool.diameter / 2),
+          radius_(tool.diameter / 2 - tool.corner_radius),  // a bull-nose meets with its floor
           ball_(tool.kind == ToolKind::ball),
           reach_(1 + (static_cast<int>(radius_ / stock.grid().cell) + 1) / kTile),
           tiles_x_((stock.grid().nx + kTile - 1) / kTile),
@@ -365,7 +365,7 @@ public:
             cut_rings(targets, border, tips[i], allowance > 0, runs);
             if (runs.size() == first) continue;
             op.stepdown = std::max(op.stepdown, ball_ ? tool_.stepdown_max : depth);
-            op.stepover = kStepShare * tool_.diameter;
+            op.stepover = step();
             if (floor) append_foot_runs(cut_, tool_, tips[i], grid, wider, runs);
         }
         emit(op, runs);
@@ -445,7 +445,7 @@ private:
     void cut_rings(LevelTargets& targets, const Loops& border, double tip, bool keeps_off,
                    std::vector<std::vector<LevelRun>>& runs) {
         const CellGrid& grid = stock_.grid();
-        const double step = kStepShare * tool_.diameter;
+        const double step = this->step();
         std::vector<Loops> rings{border};
         const double loose = ring_tolerance(tool_);
         const Loops thin = thinned(border, kRingTolerance);
@@ -547,6 +547,11 @@ private:
             if (!within_travel(places[(last + 1) % n].at)) --count;
             append(from, std::min(count, n), false);
         }
+    }
+
+    // mm between rings; those of a bull-nose must not leave ridges between their floors.
+    [[nodiscard]] double step() const {
+        return std::min(kStepShare * tool_.diameter, tool_.diameter - 2 * tool_.corner_radius);
     }
 
     // mm/min: the first cut through a place is as wide as the cutter.

@@ -45,7 +45,7 @@ std::vector<Contours> LayerCut::contours(const Cutter& cutter, std::span<const d
 
 const DropIndex& LayerCut::drops(const Cutter& cutter) const {
     for (const auto& [of, index] : made_drops)
-        if (of.profile == cutter.profile && of.radius == cutter.radius) return *index;
+        if (of == cutter) return *index;
     made_drops.emplace_back(cutter, std::make_unique<DropIndex>(solid, cutter));
     return *made_drops.back().second;
 }

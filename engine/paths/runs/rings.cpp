@@ -406,7 +406,7 @@ double ring_step(const Tool& tool) {
     // Nowhere is farther from a ring than the radius: where the innermost leaves room for none, that is a
     // step from it.
     const double widest = tool.diameter / 2 - 2 * ring_tolerance(tool) - kOffLine;
-    return std::min(tool.stepover * tool.diameter, std::max(widest, kLeastStep * tool.diameter));
+    return std::min(clearing_step(tool), std::max(widest, kLeastStep * tool.diameter));
 }
 
 double ring_tolerance(const Tool& tool) { return std::max(kFineRing, kRingShare * tool.diameter); }

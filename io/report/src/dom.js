@@ -37,6 +37,11 @@ export function words(text) {
     return text.replaceAll('_', ' ');
 }
 
+// What kind of cutter a tool is, with the corner that only a bull-nose has.
+export function cutterOf(tool) {
+    return words(tool.kind) + (tool.corner_radius ? ` R${figure(tool.corner_radius, 3)}` : '');
+}
+
 export function bytesOf(text) {
     const binary = atob(text);
     const bytes = new Uint8Array(binary.length);

@@ -1,6 +1,6 @@
 // The first screen: can it be made, how long, of what, with which tools.
 
-import {duration, figure, make, plural, words} from './dom.js';
+import {cutterOf, duration, figure, make, plural} from './dom.js';
 import {boardsText, costText} from './cutlist.js';
 import {stackView} from './drawing.js';
 import {layerMinutes, phases, plan, remarks, size, toolUse, totals, verdict, verify} from './report.js';
@@ -84,7 +84,7 @@ function toolTable() {
     const head = ['Place', 'Tool', 'Kind', 'Diameter', 'Flutes', 'Flute length', 'Stick-out', 'Spindle', 'Programs', 'Time'];
     const numeric = new Set([3, 4, 5, 6, 7, 8, 9]);
     const rows = toolUse().filter(({uses}) => uses.length > 0).map(({tool, uses, minutes}) => [
-        `T${tool.number}`, tool.name, words(tool.kind), `${figure(tool.diameter, 3)} mm`, tool.flutes, `${figure(tool.flute_length, 1)} mm`,
+        `T${tool.number}`, tool.name, cutterOf(tool), `${figure(tool.diameter, 3)} mm`, tool.flutes, `${figure(tool.flute_length, 1)} mm`,
         `${figure(tool.holder.stickout, 1)} mm`, `${figure(Math.max(...uses.map(u => u.spindle_rpm)), 0)} rpm`, plural(uses.length, 'program'), duration(minutes),
     ]);
     return make('div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'Tools to load'}, make('table', {id: 'magazine'},

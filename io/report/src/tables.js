@@ -1,6 +1,6 @@
 // Tables that sort, lead to their place in the 3D view, and can be taken along as CSV.
 
-import {duration, figure, make, words} from './dom.js';
+import {cutterOf, duration, figure, make, words} from './dom.js';
 import {drawPlaces, drawSums} from './draw.js';
 import {layerMinutes, operationName, operations, phases, plan, remarks, toolUse} from './report.js';
 
@@ -106,7 +106,7 @@ export function buildTables(section, show) {
             text('Steps by height, mm', bands),
         ], operations, r => ({layer: r.layer, operation: r.index, text: operationName(r)}), show),
         sortable('tools', 'Tools', [
-            text('Tool', r => r.tool.number, r => `T${r.tool.number}`), text('Name', r => r.tool.name), text('Kind', r => words(r.tool.kind)), number('Diameter, mm', r => r.tool.diameter, 3),
+            text('Tool', r => r.tool.number, r => `T${r.tool.number}`), text('Name', r => r.tool.name), text('Kind', r => cutterOf(r.tool)), number('Diameter, mm', r => r.tool.diameter, 3),
             number('Flutes, mm', r => r.tool.flute_length, 1), number('Shank, mm', r => r.tool.shank_diameter, 3), number('Stick-out, mm', r => r.tool.holder.stickout, 1),
             number('Holder, mm', r => r.tool.holder.diameter, 1), number('Programs', r => r.uses.length, 0), {...number('Minutes', r => r.minutes), text: r => duration(r.minutes)},
         ], toolUse(), r => r.uses.length ? {layer: r.uses[0].layer, operation: r.uses[0].index, text: `first use of T${r.tool.number}: ${operationName(r.uses[0])}`} : null, show),
