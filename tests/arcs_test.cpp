@@ -194,6 +194,29 @@ TEST(Arcs, SwitchedOffOnlyChordsRemain) {
     EXPECT_EQ(arcs_in(moves), 0);
 }
 
+TEST(Arcs, ShapesBeginAndEndWhereTheirMovesDo) {
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> place(-80, 80), turn(-3.1, 3.1), size(1, 40);
+    for (int trial = 0; trial < 500; ++trial) {
+        const double x = place(random), y = place(random), radius = size(random), start = turn(random),
+                     sweep = turn(random);
+        Move from, arc;
+        from.x = to_units(x + radius * std::cos(start)), from.y = to_units(y + radius * std::sin(start));
+        arc.x = to_units(x + radius * std::cos(start + sweep));
+        arc.y = to_units(y + radius * std::sin(start + sweep));
+        arc.i = to_units(x) - from.x, arc.j = to_units(y) - from.y;
+        const ArcShape shape = arc_shape(from, arc);
+        constexpr double near = 1e-3;  // mm
+        EXPECT_NEAR(shape.x, x, near);
+        EXPECT_NEAR(shape.y, y, near);
+        EXPECT_NEAR(shape.radius, radius, near);
+        EXPECT_NEAR(shape.sweep, sweep, near);
+        EXPECT_NEAR(shape.length(), radius * std::abs(sweep), 2 * near);
+        EXPECT_NEAR(shape.x + shape.radius * std::cos(shape.start), to_mm(from.x), near);
+        EXPECT_NEAR(shape.y + shape.radius * std::sin(shape.start), to_mm(from.y), near);
+    }
+}
+
 TEST(Arcs, TheBoxHoldsTheBulge) {
     std::mt19937 random(5);
     std::uniform_int_distribution<std::int32_t> place(-300000, 300000);
