@@ -146,9 +146,10 @@ TEST(Forces, ReferenceAgreesWithDiscs) {
         const SegmentForces f = reference_forces(s, 1e-4);
         Discs peak, mean;
         double plane = 0, all = 0, mean_plane = 0;
-        const int angles = 720;
+        const int angles = s.profile == CutterProfile::bull_nose ? 2880 : 720;
         for (int k = 0; k < angles; ++k) {
-            const Discs d = discs(s, 2 * kPi * (k + 0.37) / angles, 500);
+            const Discs d =
+                discs(s, 2 * kPi * (k + 0.37) / angles, s.profile == CutterProfile::bull_nose ? 1000 : 500);
             peak.x = std::max(peak.x, std::abs(d.x)), peak.y = std::max(peak.y, std::abs(d.y)),
             peak.z = std::max(peak.z, std::abs(d.z));
             peak.torque = std::max(peak.torque, std::abs(d.torque));
@@ -157,8 +158,8 @@ TEST(Forces, ReferenceAgreesWithDiscs) {
                 mean.torque += d.torque / angles;
             mean_plane += std::hypot(d.x, d.y) / angles;
         }
-        // Discs miss a peak at an engagement limit by up to half a step of 0.5°, and count a disc in or out
-        // whole.
+        // Discs miss a peak at an engagement limit by up to half a step, and count a disc in or out whole. A
+        // bull-nose's corner may be a small part of its edge, and comes in and out at once.
         const double within = 0.012 * all;
         EXPECT_NEAR(f.peak_x_n, peak.x, within) << i;
         EXPECT_NEAR(f.peak_y_n, peak.y, within) << i;

@@ -125,9 +125,9 @@ struct CutForce {
 [[nodiscard]] CutForce peak_force(const CutSegment& segment, double accuracy = 1e-5);
 
 /// Forces of many cuts, on an OpenCL device where there is one that passes a self-test and the cutter is no
-/// bull-nose, else by reference and
-/// closed form on the context's threads. The device's single precision differs from the reference by less
-/// than 1e-4 of a segment's peak resultant; what must not depend on the machine is decided by peak_force.
+/// bull-nose, else by reference and closed form on the context's threads. The device's single precision
+/// differs from the reference by less than 1e-4 of a segment's peak resultant; what must not depend on the
+/// machine is decided by peak_force.
 class ForceSolver {
 public:
     /// @param device "" or "auto": the fastest device that passes the self-test; "reference": none; else the

@@ -107,9 +107,9 @@ void pack(const CutSegment& s, std::size_t index, double angle, Packed& out, Seg
     out.te = f(k.kte);
     out.re = f(k.kre);
     out.ae = f(k.kae);
-    out.pieces = t.count;
+    out.pieces = s.profile == CutterProfile::bull_nose ? 0 : t.count;  // the device knows flats and balls
     out.padding = 0;
-    for (int p = 0; p < t.count; ++p) {
+    for (int p = 0; p < out.pieces; ++p) {
         const forces::Turn::Piece& piece = t.pieces[static_cast<std::size_t>(p)];
         const forces::Teeth teeth = forces::teeth_in(t, piece);
         float* to = out.piece[p];

@@ -50,12 +50,17 @@ Turn make_turn(const CutSegment& s) {
     t.first = t.entry + t.lag_per_mm * t.low;
     t.last = t.exit + t.lag_per_mm * t.high;
     if (t.high <= t.low || t.exit - t.entry < kShortest) return t;
-    std::array<double, 4> cuts{t.first, t.entry + t.lag_per_mm * t.high, t.exit + t.lag_per_mm * t.low,
+    std::array<double, 6> cuts{t.first, t.entry + t.lag_per_mm * t.high, t.exit + t.lag_per_mm * t.low,
                                t.last};
-    for (double& cut : cuts) cut -= t.pitch * std::floor(cut / t.pitch);
-    std::sort(cuts.begin(), cuts.end());
-    for (std::size_t i = 0; i < 4; ++i) {
-        const double next = i < 3 ? cuts[i + 1] : cuts[0] + t.pitch;
+    std::size_t count = 4;
+    // Over its corner an edge stands upright at once.
+    if (s.profile == CutterProfile::bull_nose && t.low < s.corner_mm && s.corner_mm < t.high)
+        for (const double end : {t.entry, t.exit}) cuts[count++] = end + t.lag_per_mm * s.corner_mm;
+    const auto used = std::span(cuts).first(count);
+    for (double& cut : used) cut -= t.pitch * std::floor(cut / t.pitch);
+    std::sort(used.begin(), used.end());
+    for (std::size_t i = 0; i < count; ++i) {
+        const double next = i + 1 < count ? cuts[i + 1] : cuts[0] + t.pitch;
         if (next - cuts[i] < kShortest) continue;
         t.pieces[static_cast<std::size_t>(t.count++)] = {cuts[i], next - cuts[i]};
     }

@@ -31,7 +31,8 @@ struct Turn {
     struct Piece {
         double begin = 0, length = 0;
     };
-    std::array<Piece, 4> pieces;
+    std::array<Piece, 6> pieces;  ///< between the turns at which a tooth comes to an end of the arc with its
+                                  ///< lower end or its upper, or with the upper end of a bull-nose's corner
     int count = 0;
 };
 
