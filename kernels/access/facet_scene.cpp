@@ -43,6 +43,19 @@ FacetPlanes planes_of(const Triangle& t) {
     return planes;
 }
 
+/// Finds what a ray hits first, with from, direction and ends set.
+void trace(RTCScene scene, RTCRayHit& ray) {
+    ray.ray.mask = 0xFFFFFFFFu;
+    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+#if defined(RTC_VERSION_MAJOR) && RTC_VERSION_MAJOR >= 4
+    rtcIntersect1(scene, &ray);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(scene, &context, &ray);
+#endif
+}
+
 }  // namespace
 
 BelowHeight below_height(const Triangle& t, double top) {
@@ -153,15 +166,7 @@ double FacetScene::first_below(double x, double y, double z, bool& leaves_solid,
     ray.ray.org_z = static_cast<float>(z);
     ray.ray.dir_z = -1;
     ray.ray.tfar = std::numeric_limits<float>::infinity();
-    ray.ray.mask = 0xFFFFFFFFu;
-    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-#if defined(RTC_VERSION_MAJOR) && RTC_VERSION_MAJOR >= 4
-    rtcIntersect1(all_.get(), &ray);
-#else
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcIntersect1(all_.get(), &context, &ray);
-#endif
+    trace(all_.get(), ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return none;
     leaves_solid = ray.hit.Ng_z < 0;
     return z - static_cast<double>(ray.ray.tfar);
@@ -178,15 +183,7 @@ FacetScene::RayHit FacetScene::first_along(const Point3& from, const Vec3d& dire
     ray.ray.dir_z = static_cast<float>(direction[2]);
     ray.ray.tnear = static_cast<float>(least);
     ray.ray.tfar = static_cast<float>(most);
-    ray.ray.mask = 0xFFFFFFFFu;
-    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-#if defined(RTC_VERSION_MAJOR) && RTC_VERSION_MAJOR >= 4
-    rtcIntersect1(all_.get(), &ray);
-#else
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcIntersect1(all_.get(), &context, &ray);
-#endif
+    trace(all_.get(), ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
     return {ray.hit.primID, static_cast<double>(ray.ray.tfar)};
 }
