@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
+#include "kernels/errors.h"
 #include "kernels/features/upright_lines.h"
 #include "kernels/parallel/parallel.h"
 
@@ -89,6 +91,19 @@ std::vector<FilledUnder> filled_under(Context& context, MeshView mesh, std::span
         }
     }
     return found;
+}
+
+std::vector<double> layer_borders(double bottom, std::span<const double> layer_tops) {
+    std::vector<double> borders{bottom};
+    for (const double top : layer_tops) {
+        if (!std::isfinite(top) || top <= borders.back())
+            throw Error(ErrorKind::usage, "features.layer_tops",
+                        "layer tops do not ascend from the mesh's bottom", std::to_string(top) + " mm");
+        borders.push_back(top);
+    }
+    if (borders.size() == 1) borders.push_back(HUGE_VAL);
+    borders.back() = HUGE_VAL;
+    return borders;
 }
 
 }  // namespace slabwright

@@ -57,4 +57,9 @@ struct FilledUnder {
 /// least.
 [[nodiscard]] double filled_cell(MeshView mesh);
 
+/// Where layers end, from the bottom up: the bottom, the tops, and infinity for the last one, for whatever
+/// lies above is its own. Internal to features.
+/// @throws Error(usage, "features.layer_tops") when the tops do not ascend from the bottom or are not finite
+[[nodiscard]] std::vector<double> layer_borders(double bottom, std::span<const double> layer_tops);
+
 }  // namespace slabwright

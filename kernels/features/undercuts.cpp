@@ -416,15 +416,7 @@ std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh,
                                               const FeatureOptions& options) {
     if (mesh.size() == 0) return {};
     const FacetClasses classes = classify_facets(context, mesh, options);
-    std::vector<double> borders{classes.z_base};
-    for (const double top : layer_tops) {
-        if (!std::isfinite(top) || top <= borders.back())
-            throw Error(ErrorKind::usage, "features.layer_tops",
-                        "layer tops do not ascend from the mesh's bottom", std::to_string(top) + " mm");
-        borders.push_back(top);
-    }
-    if (borders.size() == 1) borders.push_back(HUGE_VAL);
-    borders.back() = HUGE_VAL;  // nothing is placed on the last layer: whatever lies above is its own
+    const std::vector<double> borders = layer_borders(classes.z_base, layer_tops);
 
     auto faces_down = [&](std::uint32_t f) {
         return classes.of[f] == FacetClass::undercut || classes.of[f] == FacetClass::down_flat;

@@ -34,19 +34,6 @@ bool is_kept(const AirGap& gap, std::span<const double> borders, MilledFrom mill
     return kept.height() > kLeastGap;
 }
 
-std::vector<double> borders_of(const AirGaps& gaps, std::span<const double> layer_tops) {
-    std::vector<double> borders{gaps.bottom};
-    for (const double top : layer_tops) {
-        if (!std::isfinite(top) || top <= borders.back())
-            throw Error(ErrorKind::usage, "features.layer_tops",
-                        "layer tops do not ascend from the mesh's bottom", std::to_string(top) + " mm");
-        borders.push_back(top);
-    }
-    if (borders.size() == 1) borders.push_back(HUGE_VAL);
-    borders.back() = HUGE_VAL;  // nothing is placed on the last layer: whatever lies above is its own
-    return borders;
-}
-
 /// All rows' kept gaps one after the other, and which of them hang together.
 class Pockets {
 public:
@@ -152,7 +139,7 @@ AirGaps air_gaps(Context& context, MeshView mesh, double cell) {
 
 UnmadeAir unmade_air(Context& context, const AirGaps& gaps, std::span<const double> layer_tops,
                      MilledFrom milled) {
-    const std::vector<double> borders = borders_of(gaps, layer_tops);
+    const std::vector<double> borders = layer_borders(gaps.bottom, layer_tops);
     UnmadeAir air;
     air.of_layers.assign(borders.size() - 1, 0);
     std::vector<std::vector<Kept>> rows(gaps.rows.size());
