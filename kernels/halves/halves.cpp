@@ -139,9 +139,10 @@ private:
             std::uint32_t at = next.begin()->first;
             for (;;) {
                 if (const auto met = placed.find(at); met != placed.end()) {
-                    loops.emplace_back(path.begin() + static_cast<std::ptrdiff_t>(met->second), path.end());
-                    for (std::size_t k = met->second; k < path.size(); ++k) placed.erase(path[k]);
-                    path.resize(met->second);
+                    const std::size_t from = met->second;
+                    loops.emplace_back(path.begin() + static_cast<std::ptrdiff_t>(from), path.end());
+                    for (std::size_t k = from; k < path.size(); ++k) placed.erase(path[k]);
+                    path.resize(from);
                 }
                 const auto step = next.find(at);
                 if (step == next.end()) break;
