@@ -1,0 +1,110 @@
+#include "engine/paths/operations/rest_targets.h"
+
+#include <functional>
+
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr float kRise = 0.5F;  // mm: a wall that is lower than what stands beside it by less is as high
+
+}  // namespace
+
+RestTargets::RestTargets(Context& context, const LayerStock& stock, const RestPass& pass, double steep,
+                         const DropIndex* probe, double reach_mm)
+    : stock_(stock), rows_(static_cast<std::size_t>(stock.grid().ny)) {
+    const CellGrid& grid = stock.grid();
+    // Places around a cell, the nearest first.
+    std::vector<std::array<int, 3>> around;
+    const int reach = static_cast<int>(pass.swath / grid.cell);
+    for (int dj = -reach; dj <= reach; ++dj)
+        for (int di = -reach; di <= reach; ++di)
+            if (di * di + dj * dj <= reach * reach) around.push_back({di * di + dj * dj, di, dj});
+    std::sort(around.begin(), around.end());
+    // Whether the nearest of the surface that is as high as what stands here rises steeply.
+    auto beside_wall = [&](int i, int j) {
+        const std::size_t here = grid.index(i, j);
+        for (const auto& [far, di, dj] : around) {
+            if (i + di < 0 || i + di >= grid.nx || j + dj < 0 || j + dj >= grid.ny) continue;
+            const std::size_t c = grid.index(i + di, j + dj);
+            const double rise = static_cast<double>(stock.surface(c)) - stock.surface(here);
+            if (stock.surface(c) >= stock.height(here) - kRise && rise > 0)
+                return rise >= std::tan(steep) * std::sqrt(far) * grid.cell;
+        }
+        return false;
+    };
+    constexpr std::size_t grain = 16;  // rows
+    count_ = parallel_reduce(
+        context, rows_.size(), grain, std::size_t{0},
+        [&](std::size_t begin, std::size_t end) {
+            std::size_t count = 0;
+            for (std::size_t r = begin; r < end; ++r)
+                stock.each_left(static_cast<int>(r), pass.limit, [&, j = static_cast<int>(r)](int i) {
+                    if (reach > 0 && beside_wall(i, j)) return;
+                    const double stands = stock.z_bottom() + stock.height(grid.index(i, j));
+                    if (probe && probe->stands_over(grid.x(i), grid.y(j), just_under(stands - 1e-3))) return;
+                    ++count;
+                    if (!rows_[r].empty() && rows_[r].back()[1] + 1 == i) rows_[r].back()[1] = i;
+                    else rows_[r].push_back({i, i});
+                });
+            return count;
+        },
+        std::plus<>());
+    find_highest(reach_mm);
+}
+
+void RestTargets::find_highest(double reach) {
+    if (count_ == 0) return;
+    const CellGrid& grid = stock_.grid();
+    const int nx = (grid.nx + kTile - 1) / kTile, ny = (grid.ny + kTile - 1) / kTile;
+    tiles_x_ = static_cast<std::size_t>(nx);
+    tiles_.assign(tiles_x_ * static_cast<std::size_t>(ny), {});
+    for (std::size_t j = 0; j < rows_.size(); ++j)
+        for (const auto& [first, last] : rows_[j])
+            for (int i = first; i <= last; ++i) {
+                Tile& tile = tiles_[j / kTile * tiles_x_ + static_cast<std::size_t>(i / kTile)];
+                tile.highest = std::max(tile.highest, stock_.height(grid.index(i, static_cast<int>(j))));
+                tile.marked |= std::uint64_t{1}
+                               << (kTile * (j % kTile) + static_cast<std::size_t>(i % kTile));
+            }
+    highest_.assign(tiles_.size(), kNone);
+    const double far = reach / grid.cell;  // cells
+    const int tiles = static_cast<int>(far / kTile) + 1;
+    for (int j = 0; j < ny; ++j)
+        for (int i = 0; i < nx; ++i) {
+            const float here =
+                tiles_[static_cast<std::size_t>(j) * tiles_x_ + static_cast<std::size_t>(i)].highest;
+            if (here == kNone) continue;
+            for (int dj = -std::min(tiles, j); dj <= std::min(tiles, ny - 1 - j); ++dj)
+                for (int di = -std::min(tiles, i); di <= std::min(tiles, nx - 1 - i); ++di) {
+                    float& there = highest_[static_cast<std::size_t>(j + dj) * tiles_x_ +
+                                            static_cast<std::size_t>(i + di)];
+                    there = std::max(there, here);
+                }
+        }
+}
+
+Spans RestTargets::around(double y, double radius, double x_low, double x_high) const {
+    const CellGrid& grid = stock_.grid();
+    const int j0 = std::max(0, static_cast<int>(std::ceil((y - radius - grid.y0) / grid.cell)));
+    const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + radius - grid.y0) / grid.cell)));
+    Spans all;
+    for (int j = j0; j <= j1; ++j) {
+        const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, radius * radius - dy * dy));
+        for (const auto& run : rows_[static_cast<std::size_t>(j)]) {
+            const double low = std::max(grid.x(run[0]) - w, x_low),
+                         high = std::min(grid.x(run[1]) + w, x_high);
+            if (low < high) all.push_back({to_units(low), to_units(high)});
+        }
+    }
+    std::sort(all.begin(), all.end());
+    Spans merged;
+    for (const auto& s : all)
+        if (!merged.empty() && s[0] <= merged.back()[1]) merged.back()[1] = std::max(merged.back()[1], s[1]);
+        else merged.push_back(s);
+    return merged;
+}
+
+}  // namespace slabwright
