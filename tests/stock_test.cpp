@@ -754,11 +754,15 @@ TEST(Stock, HolesAreFilledAsFarAsTheyAreMeant) {
         for (int i = 0; i < grid.nx; ++i) {
             const auto away = [&](double x, double y) { return std::hypot(grid.x(i) - x, grid.y(j) - y); };
             const double z = stock.surface(0, grid.index(i, j));
-            if (away(14, 14) < 2.9) EXPECT_NEAR(z, 12, 1e-5);
-            else if (away(14, 5) < 2.9) EXPECT_NEAR(z, 18, 1e-5);
-            else if (away(6, 6) < 2.9) EXPECT_NEAR(z, 28, 1e-5);
-            else if (std::min({away(14, 14), away(14, 5), away(6, 6)}) > 3.2)
+            if (away(14, 14) < 2.9) {
+                EXPECT_NEAR(z, 12, 1e-5);
+            } else if (away(14, 5) < 2.9) {
+                EXPECT_NEAR(z, 18, 1e-5);
+            } else if (away(6, 6) < 2.9) {
+                EXPECT_NEAR(z, 28, 1e-5);
+            } else if (std::min({away(14, 14), away(14, 5), away(6, 6)}) > 3.2) {
                 EXPECT_NEAR(z, 30, 1e-5) << "what stands higher stays";
+            }
         }
     // What was filled is cut again.
     EXPECT_FALSE(stock.clear(5, 7, 5, 7, 27.5));
