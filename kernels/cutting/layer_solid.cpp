@@ -74,12 +74,13 @@ struct Turns {
     FacetNormals normals;
 };
 
-constexpr double kNormalRounding = 1e-6;
 std::int8_t rounded_down(double v) {
-    return static_cast<std::int8_t>(std::max(-127.0, std::floor((v - kNormalRounding) / SolidFacet::kTurn)));
+    return static_cast<std::int8_t>(
+        std::max(-127.0, std::floor((v - SolidFacet::kNormalRounding) / SolidFacet::kTurn)));
 }
 std::int8_t rounded_up(double v) {
-    return static_cast<std::int8_t>(std::min(127.0, std::ceil((v + kNormalRounding) / SolidFacet::kTurn)));
+    return static_cast<std::int8_t>(
+        std::min(127.0, std::ceil((v + SolidFacet::kNormalRounding) / SolidFacet::kTurn)));
 }
 
 // What lies between the normals beside an edge, along the way from one to the other, which is less than half
@@ -145,6 +146,42 @@ SolidFacet turned_over(const SolidFacet& f) {
     return back;
 }
 
+// What of a facet lies no higher than z_top: its corners, each followed by an edge.
+struct Clipped {
+    static constexpr int kAlongTop = 3;
+    int corners = 0;
+    std::array<Vec3d, 4> corner;
+    std::array<int, 4> of{}, which{};  // which edge of the facet follows, or kAlongTop; which corner that is
+    std::array<bool, 4> edge{}, end{},
+        cut{};  // whether edge and corner are tested here; whether it lies in the top
+
+    Clipped(const std::array<Vec3d, 3>& p, const Turns& turn, double z_top) {
+        for (int k = 0; k < 3; ++k) {
+            const Vec3d &a = p[k], &b = p[(k + 1) % 3];
+            const bool a_in = a[2] <= z_top, b_in = b[2] <= z_top, matters = turn.edges >> k & 1;
+            if (a_in) {
+                corner[corners] = a;
+                which[corners] = k;
+                cut[corners] = a[2] == z_top;
+                end[corners] = a[2] == z_top || (turn.ends >> k & 1) != 0;
+                // What lies beyond an edge in the top is not there to test it.
+                const bool in_top = a[2] == z_top && b[2] == z_top;
+                of[corners] = in_top ? kAlongTop : k;
+                edge[corners++] = matters || in_top;
+            }
+            if (a_in != b_in && a[2] != z_top && b[2] != z_top) {
+                corner[corners] = cross_plane(a, b, z_top);
+                cut[corners] = end[corners] = true;
+                of[corners] = a_in ? kAlongTop : k;
+                edge[corners++] = a_in || matters;
+            } else if (a_in && !b_in) {
+                edge[corners - 1] = true;  // a lies on the top itself: what follows it is the top edge
+                of[corners - 1] = kAlongTop;
+            }
+        }
+    }
+};
+
 // Writes the facets that it makes to `out` and `normals`, as many as pieces() says, and moves these on.
 void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_top, SolidFacet*& out,
                   FacetNormals*& normals) {
@@ -152,47 +189,14 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
     for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
     const Vec3d n = unit_normal(p[0], p[1], p[2]);
     const FacetRole role = mesh.role(f);
-    std::array<bool, 3> matters;
-    for (int k = 0; k < 3; ++k) matters[k] = turn.edges >> k & 1;
-
-    // Clip at z_top; corner[i] is followed by an edge that matters[i] (the new edge along the top always
-    // does).
-    constexpr int along_top = 3;
-    std::array<Vec3d, 4> corner;
-    std::array<bool, 4> edge{}, end{};
-    std::array<int, 4> of{}, which{};  // which edge of the facet that is, and which corner
-    std::array<bool, 4> cut{};
-    int corners = 0;
-    for (int k = 0; k < 3; ++k) {
-        const Vec3d &a = p[k], &b = p[(k + 1) % 3];
-        const bool a_in = a[2] <= z_top, b_in = b[2] <= z_top;
-        if (a_in) {
-            corner[corners] = a;
-            which[corners] = k;
-            cut[corners] = a[2] == z_top;
-            end[corners] = a[2] == z_top || (turn.ends >> k & 1) != 0;
-            // What lies beyond an edge in the top is not there to test it.
-            const bool in_top = a[2] == z_top && b[2] == z_top;
-            of[corners] = in_top ? along_top : k;
-            edge[corners++] = matters[k] || in_top;
-        }
-        if (a_in != b_in && a[2] != z_top && b[2] != z_top) {
-            corner[corners] = cross_plane(a, b, z_top);
-            cut[corners] = end[corners] = true;
-            of[corners] = a_in ? along_top : k;
-            edge[corners++] = a_in ? true : matters[k];
-        } else if (a_in && !b_in) {
-            edge[corners - 1] = true;  // a lies on the top itself: what follows it is the top edge
-            of[corners - 1] = along_top;
-        }
-    }
-    if (corners < 3) return;
+    const Clipped is(p, turn, z_top);
+    if (is.corners < 3) return;
     // Where the solid is cut off, a ball may also touch it with all between a facet's normals and the upright
     // one.
     NormalBox along_cut, at_cut;
     const std::uint8_t most_aside = *std::max_element(turn.aside.begin(), turn.aside.end());
     if (role == FacetRole::surface &&
-        std::find(cut.begin(), cut.begin() + corners, true) != cut.begin() + corners) {
+        std::find(is.cut.begin(), is.cut.begin() + is.corners, true) != is.cut.begin() + is.corners) {
         along_cut = between(n, {0, 0, 1});
         at_cut = {{0, 0, 127}, {0, 0, 127}};
         for (const NormalBox& box : turn.normals.corner) widen(at_cut, box);
@@ -200,7 +204,7 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
     }
     auto emit = [&](int i, int j, int k, bool ij, bool jk, bool ki, bool first) {
         SolidFacet s;
-        s.p = {corner[i], corner[j], corner[k]};
+        s.p = {is.corner[i], is.corner[j], is.corner[k]};
         s.normal = n;
         s.nz = static_cast<float>(n[2]);
         s.edges = static_cast<std::uint8_t>((ij ? 1 : 0) | (jk ? 2 : 0) | (ki ? 4 : 0)) & 7;
@@ -208,17 +212,19 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
         s.z_max = std::max({s.p[0][2], s.p[1][2], s.p[2][2]});
         s.top = s.z_max >= z_top;
         std::size_t at = 0;
-        for (const int c : {i, j, k}) s.aside[at++] = cut[c] ? most_aside : turn.aside[which[c]];
-        const auto ends_here = [&](int c) { return end[c] && (first || c == k); };
+        for (const int c : {i, j, k}) s.aside[at++] = is.cut[c] ? most_aside : turn.aside[is.which[c]];
+        const auto ends_here = [&](int c) { return is.end[c] && (first || c == k); };
         s.ends = static_cast<std::uint8_t>((ends_here(i) ? 1 : 0) | (ends_here(j) ? 2 : 0) |
                                            (ends_here(k) ? 4 : 0)) &
                  7;
         FacetNormals around;
         at = 0;
         for (const int c : {i, j, k}) {
-            around.edge[at] =
-                of[c] == along_top ? along_cut : turn.normals.edge[static_cast<std::size_t>(of[c])];
-            around.corner[at++] = cut[c] ? at_cut : turn.normals.corner[static_cast<std::size_t>(which[c])];
+            around.edge[at] = is.of[c] == Clipped::kAlongTop
+                                  ? along_cut
+                                  : turn.normals.edge[static_cast<std::size_t>(is.of[c])];
+            around.corner[at++] =
+                is.cut[c] ? at_cut : turn.normals.corner[static_cast<std::size_t>(is.which[c])];
         }
         if (role != FacetRole::turned) *out++ = s, *normals++ = around;
         if (role == FacetRole::surface) return;
@@ -227,10 +233,10 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
         if (role == FacetRole::unsure) back.edges = back.ends = 0;
         *out++ = back, *normals++ = FacetNormals{};
     };
-    if (corners == 3) emit(0, 1, 2, edge[0], edge[1], edge[2], true);
+    if (is.corners == 3) emit(0, 1, 2, is.edge[0], is.edge[1], is.edge[2], true);
     else {
-        emit(0, 1, 2, edge[0], edge[1], false, true);
-        emit(0, 2, 3, false, edge[2], edge[3], false);
+        emit(0, 1, 2, is.edge[0], is.edge[1], false, true);
+        emit(0, 2, 3, false, is.edge[2], is.edge[3], false);
     }
 }
 
@@ -421,147 +427,7 @@ BulkVector<std::uint32_t> facets_between(Context& context, MeshView mesh, double
     return facets;
 }
 
-// The disc lies along the facets' areas together.
-void lay_disc(std::span<const SolidFacet> facets, FacetGroup& group) {
-    Vec3d area{0, 0, 0}, low = facets[0].p[0], high = low;
-    for (const SolidFacet& f : facets) {
-        const Vec3d n = cross(minus(f.p[1], f.p[0]), minus(f.p[2], f.p[0]));
-        for (std::size_t k = 0; k < 3; ++k) {
-            area[k] += n[k];
-            low[k] = std::min({low[k], f.p[0][k], f.p[1][k], f.p[2][k]});
-            high[k] = std::max({high[k], f.p[0][k], f.p[1][k], f.p[2][k]});
-        }
-    }
-    const double length = std::sqrt(dot(area, area));
-    for (std::size_t k = 0; k < 3; ++k) {
-        group.middle[k] = static_cast<float>((low[k] + high[k]) / 2);
-        group.axis[k] = length > 0 ? static_cast<float>(area[k] / length) : (k == 2 ? 1.0F : 0.0F);
-    }
-    const Vec3d middle{group.middle[0], group.middle[1], group.middle[2]},
-        axis{group.axis[0], group.axis[1], group.axis[2]};
-    double radius2 = 0, thickness = 0, far2 = 0;
-    for (const SolidFacet& f : facets)
-        for (const Vec3d& p : f.p) {
-            const Vec3d d = minus(p, middle);
-            const double along = dot(axis, d), d2 = dot(d, d);
-            thickness = std::max(thickness, std::abs(along));
-            radius2 = std::max(radius2, d2 - along * along);
-            far2 = std::max(far2, d2);
-        }
-    // The axis is rounded, and so is what comes of it.
-    const double rounding = 1e-6 * (1 + std::sqrt(far2));
-    group.radius = static_cast<float>(std::sqrt(radius2) + rounding);
-    group.thickness = static_cast<float>(thickness + rounding);
-}
-
-constexpr FacetNormals kAnyNormals;
-
-// Of a facet, of its edges and of its corners that are to be tested.
-Facing facing_of(const SolidFacet& facet, const FacetNormals& normals) {
-    if (facet.normal == Vec3d{0, 0, 0}) return {{-1, -1, -1}, {1, 1, 1}};
-    std::array<double, 3> low = facet.normal, high = low;
-    const auto add = [&](const NormalBox& box) {
-        for (std::size_t k = 0; k < 3; ++k)
-            low[k] = std::min(low[k], box.low[k] * SolidFacet::kTurn),
-            high[k] = std::max(high[k], box.high[k] * SolidFacet::kTurn);
-    };
-    for (std::size_t k = 0; k < 3; ++k) {
-        if ((facet.edges >> k & 1) != 0) add(normals.edge[k]);
-        if ((facet.ends >> k & 1) != 0) add(normals.corner[k]);
-    }
-    Facing facing{};
-    for (std::size_t k = 0; k < 3; ++k)
-        facing.low[k] = static_cast<float>(low[k] - kNormalRounding),
-        facing.high[k] = static_cast<float>(high[k] + kNormalRounding);
-    return facing;
-}
-
 }  // namespace
-
-std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets,
-                                     std::span<const FacetNormals> normals) {
-    constexpr float inf = std::numeric_limits<float>::infinity();
-    auto down = [](double v) { return std::nextafter(static_cast<float>(v), -inf); };
-    auto up = [](double v) { return std::nextafter(static_cast<float>(v), inf); };
-    std::vector<FacetGroup> groups((facets.size() + FacetGroup::kFacets - 1) / FacetGroup::kFacets);
-    parallel_for(context, groups.size(), 4096, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t g = begin; g < end; ++g) {
-            FacetGroup group{{inf, inf}, {-inf, -inf}, inf, -inf, -inf, {}, {}, 0, 0, {}};
-            const std::span<const SolidFacet> own =
-                facets.subspan(g * FacetGroup::kFacets,
-                               std::min(FacetGroup::kFacets, facets.size() - g * FacetGroup::kFacets));
-            for (const SolidFacet& f : own) {
-                for (const Vec3d& p : f.p)
-                    for (std::size_t k = 0; k < 2; ++k) {
-                        group.low[k] = std::min(group.low[k], down(p[k]));
-                        group.high[k] = std::max(group.high[k], up(p[k]));
-                    }
-                group.z_min = std::min(group.z_min, down(f.z_min));
-                group.z_max = std::max(group.z_max, up(f.z_max));
-                if (f.nz < 0) group.overhang = std::max(group.overhang, up(f.z_max));
-            }
-            lay_disc(own, group);
-            group.facing = {{1, 1, 1}, {-1, -1, -1}};
-            for (const SolidFacet& f : own) {
-                const std::size_t i = g * FacetGroup::kFacets + static_cast<std::size_t>(&f - own.data());
-                const Facing facing = facing_of(f, i < normals.size() ? normals[i] : kAnyNormals);
-                for (std::size_t k = 0; k < 3; ++k) {
-                    group.facing.low[k] = std::min(group.facing.low[k], facing.low[k]);
-                    group.facing.high[k] = std::max(group.facing.high[k], facing.high[k]);
-                }
-            }
-            groups[g] = group;
-        }
-    });
-    return groups;
-}
-
-namespace {
-
-// GroupCorners::aside.
-float aside_at(const SolidFacet& facet, std::size_t corner) {
-    constexpr double rounding = 2e-6;
-    return facet.aside[corner] == SolidFacet::kAnyTurn
-               ? GroupCorners::kAny
-               : static_cast<float>(facet.aside[corner] * SolidFacet::kTurn + rounding);
-}
-
-}  // namespace
-
-BulkVector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets,
-                                       std::span<const FacetGroup> groups,
-                                       std::span<const FacetNormals> normals) {
-    constexpr float far_below = -1e15F;
-    BulkVector<GroupCorners> corners(groups.size());
-    parallel_for(context, groups.size(), 4096, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t g = begin; g < end; ++g) {
-            GroupCorners& to = corners[g];
-            for (std::size_t i = 0; i < FacetGroup::kFacets; ++i) {
-                const std::size_t f = g * FacetGroup::kFacets + i;
-                for (std::size_t k = 0; k < 3; ++k)
-                    for (std::size_t c = 0; c < 3; ++c)
-                        to.p[c][k][i] = f < facets.size()
-                                            ? static_cast<float>(facets[f].p[c][k] - groups[g].middle[k])
-                                            : (k == 2 ? far_below : 0.0F);
-                for (std::size_t k = 0; k < 3; ++k)
-                    to.normal[k][i] = f < facets.size() ? static_cast<float>(facets[f].normal[k]) : 0.0F;
-                to.nz[i] = f < facets.size() ? facets[f].nz : 0.0F;
-                for (std::size_t c = 0; c < 3; ++c)
-                    to.aside[c][i] = f < facets.size() ? aside_at(facets[f], c) : 0.0F;
-                to.edges[i] = f < facets.size() ? facets[f].edges | facets[f].ends << 3 : 0;
-                const FacetNormals& own = f < normals.size() ? normals[f] : kAnyNormals;
-                for (std::size_t e = 0; e < 3; ++e)
-                    for (std::size_t k = 0; k < 3; ++k) {
-                        to.edge.low[e][k][i] = own.edge[e].low[k],
-                        to.edge.high[e][k][i] = own.edge[e].high[k];
-                        to.corner.low[e][k][i] = own.corner[e].low[k],
-                        to.corner.high[e][k][i] = own.corner[e].high[k];
-                    }
-            }
-        }
-    });
-    return corners;
-}
 
 LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_top) {
     LayerSolid solid;

@@ -29,6 +29,7 @@ struct SolidFacet {
         7;  ///< bit k: this facet is the one to test the corner p[k], in which edges end that are tested
     static constexpr std::uint8_t kAnyTurn = 255;
     static constexpr double kTurn = 1.0 / 127;
+    static constexpr double kNormalRounding = 1e-6;  ///< of a unit vector that is computed
     /// How far from the direction in which this one faces, seen from above, those end of all facets that
     /// share this corner and are not level, at most, in kTurn; kAnyTurn: nothing is known. Where the solid is
     /// cut off what is known of all of the facet's corners.
