@@ -114,104 +114,132 @@ void report_no_way_in(const LayerCut& cut, LayerResult& result) {
          cut.no_way_in.front()});
 }
 
-}  // namespace
+// mm: waste that is thicker is cut in steps.
+constexpr double kWaste = 1.0;
 
-LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
-    LayerCut cut{context,
-                 layer,
-                 *layer.job,
-                 layer_solid(context, layer.mesh, layer.floor_below, layer.z_top),
-                 layer.z_bottom + layer.slab_thickness,
-                 {},
-                 alpha_map(context, layer.mesh, layer.floor_below, layer.z_top),
-                 nullptr,
-                 {}};
+std::vector<double> floors_of(const LayerJob& layer) {
+    std::vector<double> floors;
     for (const Flat& flat : layer.flats)
-        if (flat.highest < layer.z_top) cut.floors.push_back(flat.highest);
-    std::sort(cut.floors.begin(), cut.floors.end(), std::greater<>());
-    cut.floors.erase(std::unique(cut.floors.begin(), cut.floors.end(),
-                                 [](double a, double b) { return a - b < kSameFloor; }),
-                     cut.floors.end());
+        if (flat.highest < layer.z_top) floors.push_back(flat.highest);
+    std::sort(floors.begin(), floors.end(), std::greater<>());
+    floors.erase(
+        std::unique(floors.begin(), floors.end(), [](double a, double b) { return a - b < kSameFloor; }),
+        floors.end());
+    return floors;
+}
 
-    // What stands once the slab has been faced; every operation after that cuts its moves into it.
-    Standing standing(layer.stock_min, layer.stock_max, std::min(cut.stock_top, layer.z_top));
-    cut.standing = &standing;
+// The operations of one layer, one after the other.
+class LayerPaths {
+public:
+    LayerPaths(Context& context, const LayerJob& layer)
+        : context_(context),
+          layer_(layer),
+          tools_(layer.tools),
+          cut_{context,
+               layer,
+               *layer.job,
+               layer_solid(context, layer.mesh, layer.floor_below, layer.z_top),
+               layer.z_bottom + layer.slab_thickness,
+               floors_of(layer),
+               alpha_map(context, layer.mesh, layer.floor_below, layer.z_top),
+               nullptr,
+               {}},
+          standing_(layer.stock_min, layer.stock_max, std::min(cut_.stock_top, layer.z_top)) {
+        cut_.standing = &standing_;
+        const double facets_mm2 = static_cast<double>(cut_.solid.facets.size()) /
+                                  std::max(1.0, (layer.stock_max[0] - layer.stock_min[0]) *
+                                                    (layer.stock_max[1] - layer.stock_min[1]));
+        const double levels_against_rest = 0.25 + 0.6 * facets_mm2;
+        levels_share_ = levels_against_rest / (1 + levels_against_rest);
+    }
+
+    LayerResult run() {
+        take(face_layer(cut_));
+        reached(0.01);
+        for (Operation& op : rough_layer(cut_)) take(std::move(op));
+        reached(0.21);
+        for (const bool floors : {!layer_.walls_first, layer_.walls_first})
+            take(floors ? finish_floors(cut_) : finish_walls(cut_));
+        reached(0.24);
+        if (cut_.job.cutting.uniform_steps) finish([](const Operation&) {});
+        else finish_by_what_stands();
+        if (result_.given_up) return std::move(result_);
+        report_no_way_in(cut_, result_);
+        for (Operation& op : drill_holes(cut_)) take(std::move(op));
+        reached(0.95);
+        report_loose(cut_, result_);
+        // Last, so that everything before has straight moves only to think of.
+        for (Operation& op : result_.operations) {
+            context_.throw_if_cancelled();
+            fit(op);
+        }
+        context_.throw_if_cancelled();
+        reached(1);
+        return std::move(result_);
+    }
+
+private:
     // Level contours take their time by the facets that a cutter meets, all else by moves and areas: `share`
     // of that is done.
-    const double facets_mm2 =
-        static_cast<double>(cut.solid.facets.size()) /
-        std::max(1.0, (layer.stock_max[0] - layer.stock_min[0]) * (layer.stock_max[1] - layer.stock_min[1]));
-    const double levels_against_rest = 0.25 + 0.6 * facets_mm2,
-                 levels_share = levels_against_rest / (1 + levels_against_rest);
-    bool levels_done = false;
-    const auto reached = [&](double share) {
-        if (layer.progress)
-            layer.progress->reach(kPathsShare *
-                                  ((1 - levels_share) * share + (levels_done ? levels_share : 0)));
-    };
-
-    LayerResult result;
-    auto take = [&](Operation&& operation) {
-        if (!operation.moves.empty()) result.operations.push_back(std::move(operation));
-        context.throw_if_cancelled();
-    };
-    auto fit = [&](Operation& op) {
-        ArcFit how{.tolerance = arc_tolerance_units(cut.job, op.kind), .arcs = cut.job.cutting.arcs};
+    void reached(double share) const {
+        if (layer_.progress)
+            layer_.progress->reach(kPathsShare *
+                                   ((1 - levels_share_) * share + (levels_done_ ? levels_share_ : 0)));
+    }
+    void take(Operation&& operation) {
+        if (!operation.moves.empty()) result_.operations.push_back(std::move(operation));
+        context_.throw_if_cancelled();
+    }
+    void fit(Operation& op) const {
+        ArcFit how{.tolerance = arc_tolerance_units(cut_.job, op.kind), .arcs = cut_.job.cutting.arcs};
         // Roughing may round more off its corners (Operation::blend): where an arc would be run slower, its
         // chords are not.
-        if (op.kind == OperationKind::rough) how.acceleration = level_acceleration(cut.job.machine);
+        if (op.kind == OperationKind::rough) how.acceleration = level_acceleration(cut_.job.machine);
         fit_arcs(op.moves, how);
-    };
-    auto minutes = [&](std::span<const Operation> operations) {
+    }
+    [[nodiscard]] double minutes(std::span<const Operation> operations) const {
         double sum = 0;
-        for (const Operation& op : operations) sum += minutes_of(op, cut.job.machine);
+        for (const Operation& op : operations) sum += minutes_of(op, cut_.job.machine);
         return sum;
-    };
+    }
     // Whether the operations so far, which all stay, take too long. Arcs may be run faster than the straight
     // moves they are made of.
-    auto hopeless = [&] {
-        if (std::isinf(layer.most_minutes)) return false;
-        if (minutes(result.operations) <= layer.most_minutes) return false;
-        std::vector<Operation> fitted = result.operations;
+    bool hopeless() {
+        if (std::isinf(layer_.most_minutes)) return false;
+        if (minutes(result_.operations) <= layer_.most_minutes) return false;
+        std::vector<Operation> fitted = result_.operations;
         for (Operation& op : fitted) fit(op);
-        if (minutes(fitted) <= layer.most_minutes) return false;
-        result.operations = std::move(fitted);
-        result.given_up = true;
+        if (minutes(fitted) <= layer_.most_minutes) return false;
+        result_.operations = std::move(fitted);
+        result_.given_up = true;
         return true;
-    };
-    take(face_layer(cut));
-    reached(0.01);
-    for (Operation& op : rough_layer(cut)) take(std::move(op));
-    reached(0.21);
-    for (const bool floors : {!layer.walls_first, layer.walls_first})
-        take(floors ? finish_floors(cut) : finish_walls(cut));
-    reached(0.24);
-    auto finish = [&](auto&& done) {
-        Operation levels = finish_levels(cut, result.diagnostics);
-        levels_done = true;
+    }
+
+    // Slopes by level contours and by lines projected on them. @param done(operation) may strike its moves
+    template <class Done>
+    void finish(Done&& done) {
+        Operation levels = finish_levels(cut_, result_.diagnostics);
+        levels_done_ = true;
         reached(0.56);
         done(levels);
         take(std::move(levels));
         if (hopeless()) return;
-        Operation projected = cut.job.cutting.projection == Projection::offset
-                                  ? finish_offsets(cut, result.diagnostics)
-                                  : finish_raster(cut, result.diagnostics);
+        Operation projected = cut_.job.cutting.projection == Projection::offset
+                                  ? finish_offsets(cut_, result_.diagnostics)
+                                  : finish_raster(cut_, result_.diagnostics);
         reached(0.75);
         done(projected);
         take(std::move(projected));
-    };
-    if (cut.job.cutting.uniform_steps) {
-        finish([](const Operation&) {});
-        if (result.given_up) return result;
-    } else {
-        // What stands now decides the rest: waste where the roughing cutter does not fit before the ball
-        // finishes, and after it the corners that the ball leaves, by the flat end mill, and what is left of
-        // the cusps' limit anywhere.
-        const LayerTools& tools = layer.tools;
+    }
+
+    // What stands decides the rest: waste where the roughing cutter does not fit before the ball finishes,
+    // and after it the corners that the ball leaves, by the flat end mill, and what is left of the cusps'
+    // limit anywhere.
+    void finish_by_what_stands() {
         ScratchPool<StockMemory> own;
-        ScratchPool<StockMemory>& pool = layer.stock_memory != nullptr ? *layer.stock_memory : own;
+        ScratchPool<StockMemory>& pool = layer_.stock_memory != nullptr ? *layer_.stock_memory : own;
         auto memory = pool.take([] { return std::make_unique<StockMemory>(); });
-        LayerStock stock(cut.context, cut.layer, cut.solid, stock_cell(cut.layer), std::move(*memory));
+        LayerStock stock(context_, layer_, cut_.solid, stock_cell(layer_), std::move(*memory));
         // Left to the next layer, however this one ends.
         struct Leaving {
             ScratchPool<StockMemory>& pool;
@@ -219,101 +247,117 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
             LayerStock& stock;
             ~Leaving() { *memory = std::move(stock).release(), pool.give(std::move(memory)); }
         } const leaving{pool, std::move(memory), stock};
+        drop_idle(stock);
+        clear_waste(stock);
+        if (hopeless()) return;
+        finish([&](Operation& op) {
+            if (stock.cut(context_, op, tools_.finish).few()) op.moves.clear();
+        });
+        if (result_.given_up || hopeless()) return;
+        cut_corners(stock);
+    }
+
+    // A floor's cutter may have taken the whole wall beside it, and the face mill all that roughing would.
+    void drop_idle(LayerStock& stock) {
         std::vector<Operation> useful;
-        for (Operation& op : result.operations) {
+        for (Operation& op : result_.operations) {
             const Tool& tool =
-                op.tool == tools.rough.number ? tools.rough : tool_of_kind(cut.job, ToolKind::face);
-            const bool idle = op.kind != OperationKind::face && stock.cut(cut.context, op, tool).nothing();
-            // A floor's cutter may have taken the whole wall beside it, and the face mill all that roughing
-            // would.
+                op.tool == tools_.rough.number ? tools_.rough : tool_of_kind(cut_.job, ToolKind::face);
+            const bool idle = op.kind != OperationKind::face && stock.cut(context_, op, tool).nothing();
             if (!idle) useful.push_back(std::move(op));
         }
-        result.operations = std::move(useful);
-        const bool contours = clears_on_contours(cut.job);
-        constexpr double kWaste = 1.0;  // mm: what is thicker is cut in steps
-        const double finish_swath = kSwathShare * tools.finish.diameter;
-        auto waste = [&](const Tool& tool, const char* purpose) {
-            return RestPass{OperationKind::semi_rough,
-                            purpose,
-                            kWaste,
-                            true,
-                            0,
-                            semi_rough_allowance(cut.job, tool, kWaste)};
-        };
-        auto semi_rough = [&](const Tool& tool, double swath) {
-            constexpr const char* purpose = "waste beside the roughing cutter";
-            if (contours)
-                take(semi_rough_layer(cut, stock, tool,
-                                      {purpose, kWaste, swath, cut.job.cutting.wall_allowance}));
-            else take(cut_rest(cut, stock, tool, waste(tool, purpose)));
-        };
-        for (std::size_t s = 0; s < tools.semi_rough.size(); ++s)
-            semi_rough(tools.semi_rough[s],
-                       s + 1 < tools.semi_rough.size()
-                           ? tools.semi_rough[s + 1].diameter + cut.job.cutting.wall_allowance
+        result_.operations = std::move(useful);
+    }
+
+    [[nodiscard]] RestPass waste(const Tool& tool, const char* purpose) const {
+        return {OperationKind::semi_rough,
+                purpose,
+                kWaste,
+                true,
+                0,
+                semi_rough_allowance(cut_.job, tool, kWaste)};
+    }
+    void semi_rough(LayerStock& stock, const Tool& tool, double swath) {
+        constexpr const char* purpose = "waste beside the roughing cutter";
+        if (contours_)
+            take(semi_rough_layer(cut_, stock, tool,
+                                  {purpose, kWaste, swath, cut_.job.cutting.wall_allowance}));
+        else take(cut_rest(cut_, stock, tool, waste(tool, purpose)));
+    }
+    [[nodiscard]] bool last_of_kind(const Tool& tool) const {
+        return std::none_of(&tool + 1, tools_.rest.data() + tools_.rest.size(),
+                            [&](const Tool& t) { return t.kind == tool.kind; });
+    }
+
+    // Waste where the roughing cutter does not fit.
+    void clear_waste(LayerStock& stock) {
+        constexpr double kWorthAChange = 1000;  // mm² left, for a tool between others
+        const double finish_swath = kSwathShare * tools_.finish.diameter;
+        for (std::size_t s = 0; s < tools_.semi_rough.size(); ++s)
+            semi_rough(stock, tools_.semi_rough[s],
+                       s + 1 < tools_.semi_rough.size()
+                           ? tools_.semi_rough[s + 1].diameter + cut_.job.cutting.wall_allowance
                            : finish_swath);
-        // A tool between others is worth its change where much is left for it.
-        constexpr double kWasteWorthAChange = 1000, kCornersWorthAChange = 150;  // mm²
-        auto last_of_kind = [&](const Tool& tool) {
-            return std::none_of(&tool + 1, tools.rest.data() + tools.rest.size(),
-                                [&](const Tool& t) { return t.kind == tool.kind; });
-        };
-        for (const Tool& tool : tools.rest)
-            if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools.semi_rough.empty() &&
-                stock.area_over(context, 1.0) > kWasteWorthAChange)
-                semi_rough(tool, finish_swath);
-        const RestPass between = waste(tools.finish, "waste between walls");
-        take(contours ? clear_between(cut, stock, between, minutes(result.operations))
-                      : cut_rest(cut, stock, tools.finish, between));
+        for (const Tool& tool : tools_.rest)
+            if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools_.semi_rough.empty() &&
+                stock.area_over(context_, kWaste) > kWorthAChange)
+                semi_rough(stock, tool, finish_swath);
+        const RestPass between = waste(tools_.finish, "waste between walls");
+        take(contours_ ? clear_between(cut_, stock, between, minutes(result_.operations))
+                       : cut_rest(cut_, stock, tools_.finish, between));
         reached(0.56);
-        if (hopeless()) return result;
-        finish([&](Operation& op) {
-            if (stock.cut(cut.context, op, tools.finish).few()) op.moves.clear();
-        });
-        if (result.given_up || hopeless()) return result;
-        const double limit = cut.job.tolerances.cusp + 0.02;
+    }
+
+    // Corners, what is left, and narrow places, by ever smaller tools.
+    void cut_corners(LayerStock& stock) {
+        const double limit = cut_.job.tolerances.cusp + 0.02;
         // A smaller flat reaches every corner that the roughing cutter reaches, so where one follows it cuts
         // them all.
-        const bool smaller = std::any_of(tools.rest.begin(), tools.rest.end(),
+        const bool smaller = std::any_of(tools_.rest.begin(), tools_.rest.end(),
                                          [](const Tool& t) { return t.kind == ToolKind::flat; });
         if (!smaller)
-            take(cut_rest(cut, stock, tools.rough, {OperationKind::corner, "corners", limit, false}));
-        take(cut_rest(cut, stock, tools.finish, {OperationKind::finish, "what is left", limit, false}));
+            take(cut_rest(cut_, stock, tools_.rough, {OperationKind::corner, "corners", limit, false}));
+        take(cut_rest(cut_, stock, tools_.finish, {OperationKind::finish, "what is left", limit, false}));
         reached(0.94);
-        for (const Tool& tool : tools.rest) {
-            const double left = stock.area_over(context, limit);
-            if (!last_of_kind(tool) && left < kCornersWorthAChange) continue;
-            // What a tool between others is for is only seen when it has cut; where that is little it has
-            // not.
-            std::optional<Attempt> attempt;
-            const std::size_t operations = result.operations.size();
-            if (contours && !last_of_kind(tool)) attempt.emplace(cut, stock);
-            if (contours && tool.kind == ToolKind::flat)
-                take(semi_rough_layer(cut, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
-            else take(cut_rest(cut, stock, tool, waste(tool, "waste in narrow places")));
-            if (tool.kind == ToolKind::flat)
-                take(cut_rest(cut, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
-            else
-                take(cut_rest(cut, stock, tool,
-                              {OperationKind::finish, "what is left in narrow places", limit, false}));
-            if (!attempt || left - stock.area_over(context, limit) >= kCornersWorthAChange) continue;
-            attempt->undo();
-            result.operations.resize(operations);
-        }
-        result.left_mm2 = stock.area_over(context, limit);
+        for (const Tool& tool : tools_.rest) cut_narrow(stock, tool, limit);
+        result_.left_mm2 = stock.area_over(context_, limit);
     }
-    report_no_way_in(cut, result);
-    for (Operation& op : drill_holes(cut)) take(std::move(op));
-    reached(0.95);
-    report_loose(cut, result);
-    // Last, so that everything before has straight moves only to think of.
-    for (Operation& op : result.operations) {
-        context.throw_if_cancelled();
-        fit(op);
+    void cut_narrow(LayerStock& stock, const Tool& tool, double limit) {
+        constexpr double kWorthAChange = 150;  // mm² left, for a tool between others
+        const double left = stock.area_over(context_, limit);
+        if (!last_of_kind(tool) && left < kWorthAChange) return;
+        // What a tool between others is for is only seen when it has cut; where that is little it has not.
+        std::optional<Attempt> attempt;
+        const std::size_t operations = result_.operations.size();
+        if (contours_ && !last_of_kind(tool)) attempt.emplace(cut_, stock);
+        if (contours_ && tool.kind == ToolKind::flat)
+            take(semi_rough_layer(cut_, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
+        else take(cut_rest(cut_, stock, tool, waste(tool, "waste in narrow places")));
+        if (tool.kind == ToolKind::flat)
+            take(cut_rest(cut_, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
+        else
+            take(cut_rest(cut_, stock, tool,
+                          {OperationKind::finish, "what is left in narrow places", limit, false}));
+        if (!attempt || left - stock.area_over(context_, limit) >= kWorthAChange) return;
+        attempt->undo();
+        result_.operations.resize(operations);
     }
-    context.throw_if_cancelled();
-    reached(1);
-    return result;
+
+    Context& context_;
+    const LayerJob& layer_;
+    const LayerTools& tools_;
+    LayerCut cut_;
+    Standing standing_;  // once the slab has been faced; every operation after that cuts its moves into it
+    const bool contours_ = clears_on_contours(cut_.job);
+    double levels_share_ = 0;
+    bool levels_done_ = false;
+    LayerResult result_;
+};
+
+}  // namespace
+
+LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
+    return LayerPaths(context, layer).run();
 }
 
 }  // namespace slabwright
