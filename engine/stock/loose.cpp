@@ -76,162 +76,209 @@ private:
     std::size_t hanging_ = 0;
 };
 
-}  // namespace
+// The slab from its last move back to its first.
+class GrowingSlab {
+public:
+    GrowingSlab(Context& context, const HeldSlab& slab, double cell)
+        : context_(context),
+          slab_(slab),
+          grid_(grid_of(slab, cell)),
+          nx_(static_cast<std::size_t>(grid_.nx)),
+          memory_(context, grid_.count() * (3 * sizeof(std::uint32_t) + sizeof(float) + 1), "loose pieces"),
+          when_(grid_.count(), kNever),
+          holds_(grid_.count(), 0),
+          of_(grid_.count(), Pieces::kNone),
+          web_(slab.z_top - slab.z_bottom) {}
 
-std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab,
-                                     std::span<const Operation> operations, std::span<const Tool> tools,
-                                     double smallest_mm2, double cell) {
-    const double width = slab.max[0] - slab.min[0], depth = slab.max[1] - slab.min[1];
-    if (!(cell > 0)) cell = std::max(1.0, std::sqrt(width * depth / kMostCells));
-    const CellGrid grid{slab.min[0] + cell / 2, slab.min[1] + cell / 2, cell,
-                        std::max(1, static_cast<int>(std::ceil(width / cell - 0.5))),
-                        std::max(1, static_cast<int>(std::ceil(depth / cell - 0.5)))};
-    const auto nx = static_cast<std::size_t>(grid.nx);
-    const MemoryCharge memory(context, grid.count() * (3 * sizeof(std::uint32_t) + sizeof(float) + 1),
-                              "loose pieces");
+    std::vector<LoosePiece> run(std::span<const Operation> operations, std::span<const Tool> tools,
+                                double smallest_mm2) {
+        cut_through(operations, tools);
+        mark_held();
+        lay_uncut();
+        put_in_order();
+        for (std::size_t first = 0; first < order_.size();) {
+            std::size_t last = first;
+            while (last < order_.size() && when_[order_[last]] == when_[order_[first]]) ++last;
+            put_back(first, last, smallest_mm2);
+            first = last;
+        }
+        std::reverse(found_.begin(), found_.end());
+        return std::move(found_);
+    }
 
-    BulkVector<std::uint32_t> when(grid.count(), kNever);
-    std::vector<std::pair<std::size_t, std::size_t>> place;  // of each counted move
-    double web = slab.z_top - slab.z_bottom;  // how thick the slab still is when the last level begins
-    {
-        BulkVector<float> uncut(grid.count(), std::numeric_limits<float>::max());
+private:
+    static CellGrid grid_of(const HeldSlab& slab, double cell) {
+        const double width = slab.max[0] - slab.min[0], depth = slab.max[1] - slab.min[1];
+        if (!(cell > 0)) cell = std::max(1.0, std::sqrt(width * depth / kMostCells));
+        return {slab.min[0] + cell / 2, slab.min[1] + cell / 2, cell,
+                std::max(1, static_cast<int>(std::ceil(width / cell - 0.5))),
+                std::max(1, static_cast<int>(std::ceil(depth / cell - 0.5)))};
+    }
+
+    // When cells are cut through first, and how thick the slab still is when the last level begins.
+    void cut_through(std::span<const Operation> operations, std::span<const Tool> tools) {
+        BulkVector<float> uncut(grid_.count(), std::numeric_limits<float>::max());
         for (std::size_t o = 0; o < operations.size(); ++o) {
             const Operation& op = operations[o];
             const auto tool =
                 std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == op.tool; });
             if (op.kind == OperationKind::face || tool == tools.end()) continue;
-            context.throw_if_cancelled();
+            context_.throw_if_cancelled();
             const CutterEnd end = cutter_end(*tool);
             for (std::size_t i = 1; i < op.moves.size(); ++i) {
                 const Move &a = op.moves[i - 1], &b = op.moves[i];
                 if (b.feed == 0) continue;
-                const double low = to_mm(std::min(a.z, b.z)) - slab.z_bottom;
-                if (op.kind == OperationKind::rough && a.z == b.z && low > kThrough) web = std::min(web, low);
+                const double low = to_mm(std::min(a.z, b.z)) - slab_.z_bottom;
+                if (op.kind == OperationKind::rough && a.z == b.z && low > kThrough)
+                    web_ = std::min(web_, low);
                 if (low > kThrough) continue;
-                CutThrough through{when.data(), uncut.data(), slab.z_bottom + kThrough,
-                                   static_cast<std::uint32_t>(place.size())};
-                place.emplace_back(o, i);
+                CutThrough through{when_.data(), uncut.data(), slab_.z_bottom + kThrough,
+                                   static_cast<std::uint32_t>(place_.size())};
+                place_.emplace_back(o, i);
                 // Where a level move of a flat cutter begins, the move before it has cut all that the cutter
                 // covers.
                 const bool been = i > 1 && op.moves[i - 1].feed != 0 && a.z == b.z;
-                sweep_above(grid, end, {to_mm(a.x), to_mm(a.y), to_mm(a.z)},
+                sweep_above(grid_, end, {to_mm(a.x), to_mm(a.y), to_mm(a.z)},
                             {to_mm(b.x), to_mm(b.y), to_mm(b.z)}, StandingHeights{uncut.data(), 0}, through,
                             {.been = been && end.form == CutterEnd::Form::flat});
             }
         }
     }
 
-    BulkVector<char> holds(grid.count(), 0);
-    for (const Loops* region : {&slab.kept, &slab.glued}) {
-        const std::vector<std::vector<Span>> held = line_spans(*region, rows_of(grid));
-        for (int j = 0; j < grid.ny; ++j)
-            for (const Span& s : held[static_cast<std::size_t>(j)]) {
-                const int i0 =
-                    std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid.x0) / cell)));
-                const int i1 = std::min(
-                    grid.nx - 1, static_cast<int>(std::floor((s.high / kUnitsPerMm - grid.x0) / cell)));
-                if (i0 <= i1) std::fill_n(holds.data() + grid.index(i0, j), i1 - i0 + 1, char{1});
-            }
+    void mark_held() {
+        for (const Loops* region : {&slab_.kept, &slab_.glued}) {
+            const std::vector<std::vector<Span>> held = line_spans(*region, rows_of(grid_));
+            for (int j = 0; j < grid_.ny; ++j)
+                for (const Span& s : held[static_cast<std::size_t>(j)]) {
+                    const int i0 = std::max(
+                        0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid_.x0) / grid_.cell)));
+                    const int i1 = std::min(
+                        grid_.nx - 1,
+                        static_cast<int>(std::floor((s.high / kUnitsPerMm - grid_.x0) / grid_.cell)));
+                    if (i0 <= i1) std::fill_n(holds_.data() + grid_.index(i0, j), i1 - i0 + 1, char{1});
+                }
+        }
     }
 
-    Pieces pieces;
-    BulkVector<std::uint32_t> of(
-        grid.count(),
-        Pieces::kNone);  // by cell: its piece, or what has become a part of one; none: not there yet
     // Cells that are never cut through are there from the start, stretch by stretch of a row.
-    for (std::size_t row = 0; row < grid.count(); row += nx)
-        for (std::size_t i = 0; i < nx;) {
-            if (when[row + i] != kNever) {
-                ++i;
-                continue;
+    void lay_uncut() {
+        for (std::size_t row = 0; row < grid_.count(); row += nx_)
+            for (std::size_t i = 0; i < nx_;) {
+                if (when_[row + i] != kNever) {
+                    ++i;
+                    continue;
+                }
+                const std::size_t begin = i;
+                while (i < nx_ && when_[row + i] == kNever) ++i;
+                lay_stretch(row, begin, i);
             }
-            const std::size_t begin = i;
-            while (i < nx && when[row + i] == kNever) ++i;
-            const bool held = std::find(holds.data() + row + begin, holds.data() + row + i, char{1}) !=
-                              holds.data() + row + i;
-            std::uint32_t piece = held ? Pieces::kHeld : Pieces::kNone;
-            std::uint32_t last = Pieces::kNone;
-            for (std::size_t k = begin; k < i && row > 0; ++k) {
-                const std::uint32_t below = of[row + k - nx];
-                if (below == Pieces::kNone || below == last) continue;
-                last = below;
-                piece = piece == Pieces::kNone ? pieces.root(below) : pieces.join(piece, pieces.root(below));
-            }
-            if (piece == Pieces::kNone) piece = pieces.make();
-            std::fill(of.data() + row + begin, of.data() + row + i, piece);
-            Pieces::Piece& p = pieces[piece];
-            const std::size_t n = i - begin;
-            p.cells += n;
-            p.i += n * (begin + i - 1) / 2;
-            p.j += n * (row / nx);
-            p.cut_at_all = false;
+    }
+    void lay_stretch(std::size_t row, std::size_t begin, std::size_t end) {
+        const char* const last_hold = holds_.data() + row + end;
+        const bool held =
+            std::find(holds_.data() + row + begin, holds_.data() + row + end, char{1}) != last_hold;
+        std::uint32_t piece = held ? Pieces::kHeld : Pieces::kNone;
+        std::uint32_t last = Pieces::kNone;
+        for (std::size_t k = begin; k < end && row > 0; ++k) {
+            const std::uint32_t below = of_[row + k - nx_];
+            if (below == Pieces::kNone || below == last) continue;
+            last = below;
+            piece = piece == Pieces::kNone ? pieces_.root(below) : pieces_.join(piece, pieces_.root(below));
         }
+        if (piece == Pieces::kNone) piece = pieces_.make();
+        std::fill(of_.data() + row + begin, of_.data() + row + end, piece);
+        Pieces::Piece& p = pieces_[piece];
+        const std::size_t n = end - begin;
+        p.cells += n;
+        p.i += n * (begin + end - 1) / 2;
+        p.j += n * (row / nx_);
+        p.cut_at_all = false;
+    }
 
     // The others in the order in which they are put back: the last move's first; of one move's by number.
-    BulkVector<std::uint32_t> order;
-    {
-        std::vector<std::uint32_t> begins(place.size() + 1, 0);
-        for (const std::uint32_t move : when)
-            if (move != kNever) ++begins[place.size() - move];
+    void put_in_order() {
+        std::vector<std::uint32_t> begins(place_.size() + 1, 0);
+        for (const std::uint32_t move : when_)
+            if (move != kNever) ++begins[place_.size() - move];
         for (std::size_t t = 1; t < begins.size(); ++t) begins[t] += begins[t - 1];
-        order.resize(begins.back());
-        for (std::size_t c = 0; c < when.size(); ++c)
-            if (when[c] != kNever)
-                order[begins[place.size() - 1 - when[c]]++] = static_cast<std::uint32_t>(c);
+        order_.resize(begins.back());
+        for (std::size_t c = 0; c < when_.size(); ++c)
+            if (when_[c] != kNever)
+                order_[begins[place_.size() - 1 - when_[c]]++] = static_cast<std::uint32_t>(c);
     }
-    const auto each_neighbour = [&](std::size_t c, std::size_t i, auto&& fn) {
-        if (i > 0 && of[c - 1] != Pieces::kNone) fn(of[c - 1]);
-        if (i + 1 < nx && of[c + 1] != Pieces::kNone) fn(of[c + 1]);
-        if (c >= nx && of[c - nx] != Pieces::kNone) fn(of[c - nx]);
-        if (c + nx < of.size() && of[c + nx] != Pieces::kNone) fn(of[c + nx]);
-    };
 
-    std::vector<LoosePiece> found;
-    std::vector<std::uint32_t> beside;  // pieces that hang on nothing, next to what this move puts back
-    std::vector<Pieces::Piece> before;
-    for (std::size_t first = 0; first < order.size();) {
-        std::size_t last = first;
-        const std::uint32_t now = when[order[first]];
-        while (last < order.size() && when[order[last]] == now) ++last;
-        beside.clear();
-        before.clear();
-        for (std::size_t k = first; k < last && pieces.hanging() > 0; ++k)
-            each_neighbour(order[k], order[k] % nx, [&](std::uint32_t p) {
-                if (const std::uint32_t r = pieces.root(p); r != Pieces::kHeld) beside.push_back(r);
-            });
-        std::sort(beside.begin(), beside.end());
-        beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
-        for (const std::uint32_t r : beside) before.push_back(pieces[r]);
-        for (std::size_t k = first; k < last; ++k) {
-            const std::size_t c = order[k], i = c % nx;
-            std::uint32_t piece = holds[c] != 0 ? Pieces::kHeld : Pieces::kNone;
-            each_neighbour(c, i, [&](std::uint32_t p) {
-                if (p == piece) return;
-                p = pieces.root(p);
-                piece = piece == Pieces::kNone ? p : pieces.join(piece, p);
-            });
-            if (piece == Pieces::kNone) piece = pieces.make();
-            of[c] = piece;
-            if (piece == Pieces::kHeld) continue;
-            Pieces::Piece& p = pieces[piece];
-            ++p.cells;
-            p.i += i;
-            p.j += c / nx;
-        }
-        for (std::size_t k = 0; k < beside.size(); ++k) {
-            const Pieces::Piece& p = before[k];
-            const auto cells = static_cast<double>(p.cells);
-            const double area = cells * cell * cell;
-            if (area < smallest_mm2 || pieces.root(beside[k]) != Pieces::kHeld) continue;
-            const auto [o, i] = place[now];
-            found.push_back({area, p.cut_at_all ? web : slab.z_top - slab.z_bottom,
-                             grid.x0 + cell * (static_cast<double>(p.i) / cells),
-                             grid.y0 + cell * (static_cast<double>(p.j) / cells), o, i});
-        }
-        first = last;
+    template <class Fn>
+    void each_neighbour(std::size_t c, std::size_t i, Fn&& fn) const {
+        if (i > 0 && of_[c - 1] != Pieces::kNone) fn(of_[c - 1]);
+        if (i + 1 < nx_ && of_[c + 1] != Pieces::kNone) fn(of_[c + 1]);
+        if (c >= nx_ && of_[c - nx_] != Pieces::kNone) fn(of_[c - nx_]);
+        if (c + nx_ < of_.size() && of_[c + nx_] != Pieces::kNone) fn(of_[c + nx_]);
     }
-    std::reverse(found.begin(), found.end());
-    return found;
+
+    // Puts back what one move cut through, and tells of pieces that this joins to what is held.
+    void put_back(std::size_t first, std::size_t last, double smallest_mm2) {
+        beside_.clear();
+        before_.clear();
+        for (std::size_t k = first; k < last && pieces_.hanging() > 0; ++k)
+            each_neighbour(order_[k], order_[k] % nx_, [&](std::uint32_t p) {
+                if (const std::uint32_t r = pieces_.root(p); r != Pieces::kHeld) beside_.push_back(r);
+            });
+        std::sort(beside_.begin(), beside_.end());
+        beside_.erase(std::unique(beside_.begin(), beside_.end()), beside_.end());
+        for (const std::uint32_t r : beside_) before_.push_back(pieces_[r]);
+        for (std::size_t k = first; k < last; ++k) put_back(order_[k]);
+        for (std::size_t k = 0; k < beside_.size(); ++k) {
+            const Pieces::Piece& p = before_[k];
+            const auto cells = static_cast<double>(p.cells);
+            const double area = cells * grid_.cell * grid_.cell;
+            if (area < smallest_mm2 || pieces_.root(beside_[k]) != Pieces::kHeld) continue;
+            const auto [o, i] = place_[when_[order_[first]]];
+            found_.push_back({area, p.cut_at_all ? web_ : slab_.z_top - slab_.z_bottom,
+                              grid_.x0 + grid_.cell * (static_cast<double>(p.i) / cells),
+                              grid_.y0 + grid_.cell * (static_cast<double>(p.j) / cells), o, i});
+        }
+    }
+    void put_back(std::size_t c) {
+        const std::size_t i = c % nx_;
+        std::uint32_t piece = holds_[c] != 0 ? Pieces::kHeld : Pieces::kNone;
+        each_neighbour(c, i, [&](std::uint32_t p) {
+            if (p == piece) return;
+            p = pieces_.root(p);
+            piece = piece == Pieces::kNone ? p : pieces_.join(piece, p);
+        });
+        if (piece == Pieces::kNone) piece = pieces_.make();
+        of_[c] = piece;
+        if (piece == Pieces::kHeld) return;
+        Pieces::Piece& p = pieces_[piece];
+        ++p.cells;
+        p.i += i;
+        p.j += c / nx_;
+    }
+
+    Context& context_;
+    const HeldSlab& slab_;
+    const CellGrid grid_;
+    const std::size_t nx_;
+    const MemoryCharge memory_;
+    BulkVector<std::uint32_t> when_;
+    BulkVector<char> holds_;
+    BulkVector<std::uint32_t>
+        of_;      // by cell: its piece, or what has become a part of one; none: not there yet
+    double web_;  // mm
+    std::vector<std::pair<std::size_t, std::size_t>> place_;  // of each counted move
+    BulkVector<std::uint32_t> order_;                         // of cells
+    Pieces pieces_;
+    std::vector<std::uint32_t> beside_;  // pieces that hang on nothing, next to what a move puts back
+    std::vector<Pieces::Piece> before_;
+    std::vector<LoosePiece> found_;
+};
+
+}  // namespace
+
+std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab,
+                                     std::span<const Operation> operations, std::span<const Tool> tools,
+                                     double smallest_mm2, double cell) {
+    return GrowingSlab(context, slab, cell).run(operations, tools, smallest_mm2);
 }
 
 }  // namespace slabwright

@@ -155,174 +155,236 @@ double least_width(const RoughStep& terrace, const RoughStep& floor, double cusp
            (share < 1 ? (terrace.level.tip - floor.level.tip) * share / std::sqrt(1 - share * share) : 1e3);
 }
 
-}  // namespace
+// The levels of one layer, from their borders to moves.
+class Roughing {
+public:
+    explicit Roughing(const LayerCut& cut)
+        : cut_(cut),
+          tool_(cut.layer.tools.rough),
+          contour_(cut.job.cutting.rough_pattern == RoughPattern::contour),
+          r_(tool_.diameter / 2),
+          cutter_{Cutter::Profile::flat, r_ + kept_off_walls(cut.job.cutting)},
+          op_(cut.operation(OperationKind::rough, contour_ ? "contour-parallel levels" : "zigzag levels",
+                            tool_)),
+          steps_(contour_ ? terraced_steps(cut, tool_, cut.job.cutting.floor_allowance)
+                          : level_steps(cut, tool_, cut.job.cutting.floor_allowance)),
+          last_(steps_.back().floor) {
+        op_.blend = rough_blend(cut.job);
+        if (cut.job.cutting.max_engagement < 1)
+            stock_.emplace(cut.layer.stock_min, cut.layer.stock_max, std::min(cut.stock_top, cut.layer.z_top),
+                           r_);
+    }
 
-std::vector<Operation> rough_layer(const LayerCut& cut) {
-    const Tool& tool = cut.layer.tools.rough;
-    const bool contour = cut.job.cutting.rough_pattern == RoughPattern::contour;
-    Operation op =
-        cut.operation(OperationKind::rough, contour ? "contour-parallel levels" : "zigzag levels", tool);
-    op.blend = rough_blend(cut.job);
-    const double r = tool.diameter / 2, clearance = cut.layer.z_top + cut.job.machine.clearance;
-    const Cutter cutter{Cutter::Profile::flat, r + kept_off_walls(cut.job.cutting)};
-    const double allowance = cut.job.cutting.floor_allowance;
-    const std::vector<RoughStep> steps =
-        contour ? terraced_steps(cut, tool, allowance) : level_steps(cut, tool, allowance);
-    const std::size_t last = steps.back().floor;  // cuts the slab through
-    std::vector<double> spare;
-    for (const RoughStep& s : steps) spare.push_back(s.level.spare);
-    const std::vector<Section> inside = cut.insides(cutter, spare);
+    std::vector<Operation> run() {
+        lay_lines();
+        find_borders();
+        clear_open();
+        std::vector<Level> cuts(steps_.size());
+        parallel_each(cut_.context, steps_.size(), [&](std::size_t i) { cuts[i] = plan_level(i); });
+        lay_paths(cuts);
+        if (stock_ && op_.stepdown > 0) {
+            stock_->change_cutter(r_);
+            cap_engagement(cut_.context, op_.moves, *stock_,
+                           {cut_.job.cutting.max_engagement, tool_.diameter, op_.stepdown});
+        }
+        std::vector<Operation> operations;
+        if (!cleared_.moves.empty()) operations.push_back(std::move(cleared_));
+        operations.push_back(std::move(op_));
+        return operations;
+    }
 
-    // Lines from edge to edge of the stock, evenly spaced.
-    const double depth = cut.layer.stock_max[1] - cut.layer.stock_min[1];
-    const int gaps = std::max(1, static_cast<int>(std::ceil(depth / clearing_step(tool) - 1e-9)));
-    std::vector<std::int32_t> lines;
-    for (int k = 0; k <= gaps; ++k) lines.push_back(to_units(cut.layer.stock_min[1] + depth * k / gaps));
-    // Contours of the border may be coarser than a finish pass: what their chords miss must stay well inside
-    // the allowance.
-    const std::int32_t pitch = safe_pitch(r, std::max(0.01, 0.2 * cut.job.cutting.wall_allowance));
-    const FibreGrid grid = fibre_grid(cut.solid, cutter, pitch);
-    const double from = cut.low(0, r + 2), to = cut.high(0, r + 2);
-
+private:
     struct Level {
         RingPlan rings;
         std::vector<std::vector<Stretch>> free;  // where no rings are cut
     };
-    const bool flask = !cut.layer.opening.empty();
-    // A ring may leave its border, and an arc the ring.
-    const double off_flask = r + kOnBorder + arc_tolerance_units(cut.job, OperationKind::rough) / kUnitsPerMm;
-    const Loops room = flask ? flask_room(cut, off_flask) : Loops{};
-    std::vector<FibreLevel> heights;
-    for (std::size_t i = 0; i < steps.size(); ++i)
-        heights.push_back({steps[i].level.spare, &inside[i].loops});
-    const std::vector<Contours> borders = level_contours(cut.context, cut.solid, heights, cutter, grid);
-    std::vector<Loops> forbidden_at(steps.size());
-    const Loops beyond = flask ? beyond_room(cut, off_flask, room) : Loops{};
-    parallel_each(cut.context, steps.size(), [&](std::size_t i) {
-        forbidden_at[i] = simplify(forbidden_region(borders[i]));
-        if (flask) forbidden_at[i] = unite(forbidden_at[i], beyond);
-    });
-    std::optional<EngagedStock> stock;
-    if (cut.job.cutting.max_engagement < 1)
-        stock.emplace(cut.layer.stock_min, cut.layer.stock_max, std::min(cut.stock_top, cut.layer.z_top), r);
-    std::vector<OpenLevel> open(steps.size());
-    Operation cleared;
-    if (const Tool* face = open_waste_tool(cut)) {
-        parallel_each(cut.context, steps.size(), [&](std::size_t i) {
-            if (steps[i].floor == i)
-                open[i] = plan_open_level(cut, *face, tool, forbidden_at[i], steps[i].level.tip,
-                                          steps[i].above, i == last);
-        });
-        leave_below_first_gap(open);
-        cleared = clear_open_waste(cut, *face, open, stock ? &*stock : nullptr);
-    }
-    std::vector<Level> cuts(steps.size());
-    parallel_each(cut.context, steps.size(), [&](std::size_t i) {
-        const double tip = steps[i].level.tip;
-        if (const std::size_t floor = steps[i].floor; floor != i) {
-            const double width = least_width(steps[i], steps[floor], cut.job.tolerances.rough_cusp);
-            cuts[i].rings = plan_terrace(
-                cut, tool, forbidden_at[i], offset_outline(forbidden_at[floor], -width, kOffsetError),
-                offset_outline(forbidden_at[i - 1], -kMoreThanStep, kOffsetError), tip, op.blend);
-            return;
-        }
-        if (!cleared.moves.empty() && !open[i].left.empty()) {
-            cuts[i].rings =
-                plan_terrace(cut, tool, forbidden_at[i], open[i].left, open[i].left, tip, op.blend);
-            return;
-        }
-        if (i == last || contour) {
-            cuts[i].rings = plan_rings(cut, tool, forbidden_at[i], tip, op.blend, i == last);
-            if (!cuts[i].rings.pieces.empty()) return;
-        }
-        const Fibres forbidden = beside_flask(
-            cut, room,
-            fibres(cut.context, cut.solid, inside[i].loops, cutter, steps[i].level.spare, Axis::x, lines),
-            Axis::x, lines);
-        for (std::size_t l = 0; l < lines.size(); ++l)
-            cuts[i].free.push_back(free_stretches(forbidden.line(l), from, to, 0.2));
-    });
 
-    PathBuilder path(op, tool, std::min(tool.max_feed, cut.job.machine.max_feed), clearance,
-                     cut.layer.z_top + 2);
-    const DropIndex part(cut.solid, cutter);
-    Surroundings around = cut.around(tool, &part);
-    for (std::size_t i = 0; i < steps.size(); ++i)
-        if (!cuts[i].rings.pieces.empty() || !cuts[i].free.empty())
-            around.deepest = std::max(around.deepest, steps[i].above - steps[i].level.tip);
-    path.set_surroundings(around);
-    for (std::size_t i = 0; i < steps.size(); ++i) {
-        const double above = steps[i].above, tip = steps[i].level.tip;
-        if (!cuts[i].rings.pieces.empty()) {
-            op.stepdown = std::max(op.stepdown, above - tip);
-            op.stepover = std::max(op.stepover, cuts[i].rings.widest_step());
-            clear_from_afar(path, cut, std::move(cuts[i].rings));
-            continue;
-        }
-        if (cuts[i].free.empty()) continue;  // rings, of which none were of use
-        op.stepdown = std::max(op.stepdown, above - tip);
-        op.stepover = std::max(op.stepover, depth / gaps);
-        zigzag(path, cut, tool, lines, cuts[i].free, tip, [&](std::span<const std::int32_t> at) {
-            return beside_flask(
-                cut, room,
-                fibres(cut.context, cut.solid, inside[i].loops, cutter, steps[i].level.spare, Axis::y, at),
-                Axis::y, at);
+    // Lines from edge to edge of the stock, evenly spaced.
+    void lay_lines() {
+        const double low = cut_.layer.stock_min[1], depth = cut_.layer.stock_max[1] - low;
+        const int gaps = std::max(1, static_cast<int>(std::ceil(depth / clearing_step(tool_) - 1e-9)));
+        for (int k = 0; k <= gaps; ++k) lines_.push_back(to_units(low + depth * k / gaps));
+        between_lines_ = depth / gaps;
+    }
+
+    // What each level may not enter.
+    void find_borders() {
+        std::vector<double> spare;
+        for (const RoughStep& s : steps_) spare.push_back(s.level.spare);
+        inside_ = cut_.insides(cutter_, spare);
+        const FibreGrid grid = fibre_grid(cut_.solid, cutter_, pitch_);
+        const bool flask = !cut_.layer.opening.empty();
+        // A ring may leave its border, and an arc the ring.
+        const double off_flask =
+            r_ + kOnBorder + arc_tolerance_units(cut_.job, OperationKind::rough) / kUnitsPerMm;
+        if (flask) room_ = flask_room(cut_, off_flask);
+        std::vector<FibreLevel> heights;
+        for (std::size_t i = 0; i < steps_.size(); ++i)
+            heights.push_back({steps_[i].level.spare, &inside_[i].loops});
+        borders_ = level_contours(cut_.context, cut_.solid, heights, cutter_, grid);
+        forbidden_at_.resize(steps_.size());
+        const Loops beyond = flask ? beyond_room(cut_, off_flask, room_) : Loops{};
+        parallel_each(cut_.context, steps_.size(), [&](std::size_t i) {
+            forbidden_at_[i] = simplify(forbidden_region(borders_[i]));
+            if (flask) forbidden_at_[i] = unite(forbidden_at_[i], beyond);
         });
-        // Along the border, begun where a zigzag line ends and the cutter has been already.
-        const Contours& border = borders[i];
-        const std::int32_t z = to_units(tip);
+    }
+
+    // What lies open goes to the face mill.
+    void clear_open() {
+        open_.resize(steps_.size());
+        const Tool* face = open_waste_tool(cut_);
+        if (face == nullptr) return;
+        parallel_each(cut_.context, steps_.size(), [&](std::size_t i) {
+            if (steps_[i].floor == i)
+                open_[i] = plan_open_level(cut_, *face, tool_, forbidden_at_[i], steps_[i].level.tip,
+                                           steps_[i].above, i == last_);
+        });
+        leave_below_first_gap(open_);
+        cleared_ = clear_open_waste(cut_, *face, open_, stock_ ? &*stock_ : nullptr);
+    }
+
+    [[nodiscard]] Level plan_level(std::size_t i) const {
+        Level level;
+        const double tip = steps_[i].level.tip;
+        if (const std::size_t floor = steps_[i].floor; floor != i) {
+            const double width = least_width(steps_[i], steps_[floor], cut_.job.tolerances.rough_cusp);
+            level.rings = plan_terrace(
+                cut_, tool_, forbidden_at_[i], offset_outline(forbidden_at_[floor], -width, kOffsetError),
+                offset_outline(forbidden_at_[i - 1], -kMoreThanStep, kOffsetError), tip, op_.blend);
+            return level;
+        }
+        if (!cleared_.moves.empty() && !open_[i].left.empty()) {
+            level.rings =
+                plan_terrace(cut_, tool_, forbidden_at_[i], open_[i].left, open_[i].left, tip, op_.blend);
+            return level;
+        }
+        if (i == last_ || contour_) {
+            level.rings = plan_rings(cut_, tool_, forbidden_at_[i], tip, op_.blend, i == last_);
+            if (!level.rings.pieces.empty()) return level;
+        }
+        const Fibres forbidden = forbidden_on(i, Axis::x, lines_);
+        const double from = cut_.low(0, r_ + 2), to = cut_.high(0, r_ + 2);
+        for (std::size_t l = 0; l < lines_.size(); ++l)
+            level.free.push_back(free_stretches(forbidden.line(l), from, to, 0.2));
+        return level;
+    }
+    [[nodiscard]] Fibres forbidden_on(std::size_t i, Axis axis, std::span<const std::int32_t> lines) const {
+        return beside_flask(
+            cut_, room_,
+            fibres(cut_.context, cut_.solid, inside_[i].loops, cutter_, steps_[i].level.spare, axis, lines),
+            axis, lines);
+    }
+
+    void lay_paths(std::vector<Level>& cuts) {
+        PathBuilder path(op_, tool_, std::min(tool_.max_feed, cut_.job.machine.max_feed),
+                         cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
+        const DropIndex part(cut_.solid, cutter_);
+        Surroundings around = cut_.around(tool_, &part);
+        for (std::size_t i = 0; i < steps_.size(); ++i)
+            if (!cuts[i].rings.pieces.empty() || !cuts[i].free.empty())
+                around.deepest = std::max(around.deepest, steps_[i].above - steps_[i].level.tip);
+        path.set_surroundings(around);
+        for (std::size_t i = 0; i < steps_.size(); ++i) {
+            const double down = steps_[i].above - steps_[i].level.tip;
+            if (!cuts[i].rings.pieces.empty()) {
+                op_.stepdown = std::max(op_.stepdown, down);
+                op_.stepover = std::max(op_.stepover, cuts[i].rings.widest_step());
+                clear_from_afar(path, cut_, std::move(cuts[i].rings));
+                continue;
+            }
+            if (cuts[i].free.empty()) continue;  // rings, of which none were of use
+            op_.stepdown = std::max(op_.stepdown, down);
+            op_.stepover = std::max(op_.stepover, between_lines_);
+            zigzag(path, cut_, tool_, lines_, cuts[i].free, steps_[i].level.tip,
+                   [&](std::span<const std::int32_t> at) { return forbidden_on(i, Axis::y, at); });
+            follow_border(path, i);
+            follow_flask(path, i);
+        }
+        path.finish();
+    }
+
+    // Where along a loop of a border a zigzag line has come nearest, and how near, 0.1 µm.
+    struct Nearest {
+        std::size_t point = 0;
+        std::int64_t away = INT64_MAX;
+    };
+    [[nodiscard]] Nearest nearest_line(std::span<const Point2> points) const {
+        Nearest nearest;
+        for (std::size_t k = 0; k < points.size(); ++k) {
+            const auto it = std::lower_bound(lines_.begin(), lines_.end(), points[k].y);
+            for (const auto l : {it, it == lines_.begin() ? it : std::prev(it)}) {
+                if (l == lines_.end()) continue;
+                const std::int64_t d = std::abs(std::int64_t{*l} - points[k].y);
+                if (d < nearest.away) nearest = {k, d};
+            }
+        }
+        return nearest;
+    }
+    [[nodiscard]] bool in_stock(Point2 p) const {
+        return to_mm(p.x) > cut_.layer.stock_min[0] - r_ && to_mm(p.x) < cut_.layer.stock_max[0] + r_ &&
+               to_mm(p.y) > cut_.layer.stock_min[1] - r_ && to_mm(p.y) < cut_.layer.stock_max[1] + r_;
+    }
+
+    // Along the border, begun where a zigzag line ends and the cutter has been already.
+    void follow_border(PathBuilder& path, std::size_t i) const {
+        const Contours& border = borders_[i];
+        const std::int32_t z = to_units(steps_[i].level.tip);
         for (std::size_t c = 0; c < border.size(); ++c) {
             const auto points =
                 std::span(border.points).subspan(border.starts[c], border.starts[c + 1] - border.starts[c]);
             if (points.size() < 3) continue;
-            std::size_t start = 0;
-            std::int64_t nearest = INT64_MAX;
-            bool in_stock = false;
-            for (std::size_t k = 0; k < points.size(); ++k) {
-                const auto it = std::lower_bound(lines.begin(), lines.end(), points[k].y);
-                for (const auto l : {it, it == lines.begin() ? it : std::prev(it)}) {
-                    if (l == lines.end()) continue;
-                    const std::int64_t d = std::abs(std::int64_t{*l} - points[k].y);
-                    if (d < nearest) nearest = d, start = k;
-                }
-                in_stock |= to_mm(points[k].x) > cut.layer.stock_min[0] - r &&
-                            to_mm(points[k].x) < cut.layer.stock_max[0] + r &&
-                            to_mm(points[k].y) > cut.layer.stock_min[1] - r &&
-                            to_mm(points[k].y) < cut.layer.stock_max[1] + r;
-            }
-            if (!in_stock) continue;
+            if (std::none_of(points.begin(), points.end(), [&](Point2 p) { return in_stock(p); })) continue;
+            const Nearest nearest = nearest_line(points);
             std::vector<PathPoint> line;
             for (std::size_t k = 0; k <= points.size(); ++k) {
-                const Point2 p = points[(start + k) % points.size()];
+                const Point2 p = points[(nearest.point + k) % points.size()];
                 line.push_back({p.x, p.y, z});
             }
             const std::vector<PathPoint> ring = simplify(line, 0.02 * kUnitsPerMm);
             path.go_above({ring[0].x, ring[0].y});
-            if (nearest > 2 * std::int64_t{pitch}) {  // a pocket that no line met
-                cut_ring(path, ring, to_units(above), z, cut.job.cutting.ramp_deg);
-                continue;
-            }
-            path.follow(ring);
+            if (nearest.away > 2 * std::int64_t{pitch_})  // a pocket that no line met
+                cut_ring(path, ring, to_units(steps_[i].above), z, cut_.job.cutting.ramp_deg);
+            else path.follow(ring);
         }
-        // Along the flask, which is finished with that.
-        for (std::size_t l = 0; l < room.size(); ++l) {
+    }
+
+    // Along the flask, which is finished with that.
+    void follow_flask(PathBuilder& path, std::size_t i) const {
+        const std::int32_t z = to_units(steps_[i].level.tip);
+        for (std::size_t l = 0; l < room_.size(); ++l) {
             std::vector<PathPoint> ring;
-            for (const Point2 p : room.loop(l)) ring.push_back({p.x, p.y, z});
+            for (const Point2 p : room_.loop(l)) ring.push_back({p.x, p.y, z});
             ring.push_back(ring.front());
             path.go_above({ring[0].x, ring[0].y});
-            cut_ring(path, ring, to_units(above), z, cut.job.cutting.ramp_deg);
+            cut_ring(path, ring, to_units(steps_[i].above), z, cut_.job.cutting.ramp_deg);
         }
     }
-    path.finish();
-    if (stock && op.stepdown > 0) {
-        stock->change_cutter(r);
-        cap_engagement(cut.context, op.moves, *stock,
-                       {cut.job.cutting.max_engagement, tool.diameter, op.stepdown});
-    }
-    std::vector<Operation> operations;
-    if (!cleared.moves.empty()) operations.push_back(std::move(cleared));
-    operations.push_back(std::move(op));
-    return operations;
-}
+
+    const LayerCut& cut_;
+    const Tool& tool_;
+    const bool contour_;
+    const double r_;
+    const Cutter cutter_;
+    Operation op_;
+    const std::vector<RoughStep> steps_;
+    const std::size_t last_;  // cuts the slab through
+    std::vector<std::int32_t> lines_;
+    double between_lines_ = 0;  // mm
+    // Contours of the border may be coarser than a finish pass: what their chords miss must stay well inside
+    // the allowance.
+    const std::int32_t pitch_ = safe_pitch(r_, std::max(0.01, 0.2 * cut_.job.cutting.wall_allowance));
+    std::optional<EngagedStock> stock_;
+    Loops room_;  // beside the flask
+    std::vector<Section> inside_;
+    std::vector<Contours> borders_;
+    std::vector<Loops> forbidden_at_;
+    std::vector<OpenLevel> open_;
+    Operation cleared_;  // by the face mill
+};
+
+}  // namespace
+
+std::vector<Operation> rough_layer(const LayerCut& cut) { return Roughing(cut).run(); }
 
 }  // namespace slabwright
