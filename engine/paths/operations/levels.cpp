@@ -208,156 +208,203 @@ void spare_long(std::span<const Point2> contour, const std::vector<char>& spared
     }
 }
 
-}  // namespace
+constexpr double kDegree = std::numbers::pi / 180;
 
-Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
-    const Tool& tool = cut.layer.tools.finish;
-    Operation op = cut.operation(OperationKind::finish, "level contours", tool);
-    const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, vertical = vertical_nz(cut),
-                 degree = std::numbers::pi / 180;
-    const FinishSlopes slopes = finish_slopes(cut.job.cutting);
-    const double split = slopes.levels_from;
-    if (split > std::numbers::pi / 2) return op;
-    double low = kUnbounded, high = -kUnbounded;
-    bool any_vertical = false;  // else nothing goes along walls before, and edges are all that is as steep
-    for (const SolidFacet& f : cut.solid.facets) {
-        if (f.nz > std::cos(split) || f.z_max <= cut.layer.z_bottom ||
-            (f.normal[0] == 0 && f.normal[1] == 0 && f.nz >= 0))
-            continue;
-        any_vertical |= f.nz <= vertical;
-        low = std::min(low, std::max(f.z_min, cut.layer.z_bottom));
-        high = std::max(high, f.z_max);
+// The level contours of one layer.
+class LevelContours {
+public:
+    explicit LevelContours(const LayerCut& cut)
+        : cut_(cut),
+          tool_(cut.layer.tools.finish),
+          r_(tool_.diameter / 2),
+          slopes_(finish_slopes(cut.job.cutting)),
+          cutter_{Cutter::Profile::ball, r_},
+          op_(cut.operation(OperationKind::finish, "level contours", tool_)) {}
+
+    Operation run(std::vector<Diagnostic>& diagnostics) {
+        if (slopes_.levels_from > std::numbers::pi / 2 || !find_walls()) return op_;
+        place_levels(diagnostics);
+        const FibreGrid grid = fibre_grid(cut_.solid, cutter_, safe_pitch(r_, cut_.job.tolerances.gouge));
+        const std::vector<Contours> contours = cut_.contours(cutter_, tips_, grid.pitch);
+        // A vertical wall belongs to the flat end mill wherever that can stand against the place of contact.
+        const DropIndex flat(cut_.solid, Cutter{Cutter::Profile::flat, flat_r_ - kNarrower});
+        const DropIndex& part = cut_.drops(cutter_);
+        // So high a wall of the least slope that is called vertical leans out by as much as `flat` is
+        // narrower.
+        const double least_wall = kNarrower / std::tan((90 - cut_.job.cutting.vertical_deg) * kDegree);
+        const EdgeContacts edges(part, flat, flat_r_, cut_.layer.tools.rough.stepdown_max,
+                                 cut_.layer.z_bottom, least_wall, std::cos(slopes_.levels_from));
+        flat_ = &flat, edges_ = &edges;
+        std::vector<std::vector<LevelRun>> runs(tips_.size());
+        parallel_each(cut_.context, tips_.size(), [&](std::size_t i) {
+            append_wanted(contours[i],
+                          {tips_[i], i > 0 ? std::optional(tips_[i - 1]) : std::nullopt,
+                           i + 1 < tips_.size() ? std::optional(tips_[i + 1]) : std::nullopt},
+                          nullptr, runs[i]);
+        });
+        for (std::size_t i = 0; i < tips_.size(); ++i) spaced_[i].cuts = !runs[i].empty();
+        for (FootLevel& foot : feet(grid)) runs.push_back(std::move(foot.runs));
+        op_.bands = bands_of(cut_, spaced_, slopes_.levels_keep, tool_.stepdown_max);
+        PathBuilder path(op_, tool_, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed),
+                         cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
+        path.set_surroundings(cut_.around(tool_, &part));
+        cut_levels(path, cut_, tool_, part, runs, true);
+        path.finish();
+        return std::move(op_);
     }
-    if (low >= high) return op;
+
+private:
+    // Between which heights walls are that levels finish; false where none is.
+    bool find_walls() {
+        low_ = kUnbounded, high_ = -kUnbounded;
+        for (const SolidFacet& f : cut_.solid.facets) {
+            if (f.nz > std::cos(slopes_.levels_from) || f.z_max <= cut_.layer.z_bottom ||
+                (f.normal[0] == 0 && f.normal[1] == 0 && f.nz >= 0))
+                continue;
+            any_vertical_ |= f.nz <= vertical_;
+            low_ = std::min(low_, std::max(f.z_min, cut_.layer.z_bottom));
+            high_ = std::max(high_, f.z_max);
+        }
+        return low_ < high_;
+    }
 
     // From the highest tip that may touch, down to the lowest whose contact is still in the layer.
-    std::vector<double> tips;
-    std::vector<SpacedLevel> spaced;
-    const double lowest = std::max(cut.layer.floor_below, low - r);
-    double bite = 0;
-    for (double z = high; z > lowest;) {
-        const bool everywhere = cut.job.cutting.uniform_steps;
-        const double alpha = cut.least_slope(everywhere ? low : z - tool.stepdown_max,
-                                             everywhere ? high : std::min(high, z + r), slopes.levels_keep);
-        double step = std::min(ball_level_stepdown(r, alpha, cut.job.tolerances.cusp), tool.stepdown_max);
-        if (step < cut.job.cutting.min_stepdown) {
-            bite = std::max(bite, ball_level_cusp(r, alpha, cut.job.cutting.min_stepdown));
-            step = cut.job.cutting.min_stepdown;
+    void place_levels(std::vector<Diagnostic>& diagnostics) {
+        const Job& job = cut_.job;
+        lowest_ = std::max(cut_.layer.floor_below, low_ - r_);
+        double bite = 0;
+        for (double z = high_; z > lowest_;) {
+            const bool everywhere = job.cutting.uniform_steps;
+            const double alpha =
+                cut_.least_slope(everywhere ? low_ : z - tool_.stepdown_max,
+                                 everywhere ? high_ : std::min(high_, z + r_), slopes_.levels_keep);
+            double step = std::min(ball_level_stepdown(r_, alpha, job.tolerances.cusp), tool_.stepdown_max);
+            if (step < job.cutting.min_stepdown) {
+                bite = std::max(bite, ball_level_cusp(r_, alpha, job.cutting.min_stepdown));
+                step = job.cutting.min_stepdown;
+            }
+            z = std::max(z - step, lowest_);
+            spaced_.push_back({z + r_ * (1 - std::cos(alpha)), step});
+            op_.stepdown = std::max(op_.stepdown, step);
+            tips_.push_back(z);
         }
-        z = std::max(z - step, lowest);
-        spaced.push_back({z + r * (1 - std::cos(alpha)), step});
-        op.stepdown = std::max(op.stepdown, step);
-        tips.push_back(z);
+        if (bite > 0)
+            diagnostics.push_back(
+                {Severity::warning,
+                 "finish.stepdown_floor",
+                 fmt::format("layer {}: the smallest stepdown {:.2f} mm leaves a cusp of up to {:.3f} mm",
+                             cut_.layer.index, job.cutting.min_stepdown, bite),
+                 {}});
     }
-    const double foot_nz = std::cos(80 * degree);
 
-    if (bite > 0)
-        diagnostics.push_back(
-            {Severity::warning,
-             "finish.stepdown_floor",
-             fmt::format("layer {}: the smallest stepdown {:.2f} mm leaves a cusp of up to {:.3f} mm",
-                         cut.layer.index, cut.job.cutting.min_stepdown, bite),
-             {}});
-
-    const Cutter cutter{Cutter::Profile::ball, r};
-    const FibreGrid grid = fibre_grid(cut.solid, cutter, safe_pitch(r, gouge));
-    const std::vector<Contours> contours = cut.contours(cutter, tips, grid.pitch);
-    // A vertical wall belongs to the flat end mill wherever that can stand against the place of contact.
-    const double flat_r = cut.layer.tools.rough.diameter / 2;
-    const DropIndex flat(cut.solid, Cutter{Cutter::Profile::flat, flat_r - kNarrower});
-    const DropIndex& part = cut.drops(cutter);
-    // So high a wall of the least slope that is called vertical leans out by as much as `flat` is narrower.
-    const double least_wall = kNarrower / std::tan((90 - cut.job.cutting.vertical_deg) * degree);
-    const EdgeContacts edges(part, flat, flat_r, cut.layer.tools.rough.stepdown_max, cut.layer.z_bottom,
-                             least_wall, std::cos(split));
-    // What of a level is cut: `above` and `below`, the tips one level higher and lower, where there are such;
-    // `floor`, on whose walls' feet alone, where it is for them.
-    auto append_wanted = [&](const Contours& level, double tip, std::optional<double> above,
-                             std::optional<double> below, const NearFloor* floor,
-                             std::vector<LevelRun>& out) {
+    // A level's tip, and those one level higher and lower, where there are such, mm.
+    struct Tips {
+        double tip;
+        std::optional<double> above, below;
+    };
+    // What of a level is cut. @param floor on whose walls' feet alone, where it is for them
+    void append_wanted(const Contours& level, const Tips& tips, const NearFloor* floor,
+                       std::vector<LevelRun>& out) const {
         for (std::size_t c = 0; c < level.size(); ++c) {
             const std::size_t first = level.starts[c], n = level.starts[c + 1] - first;
             std::vector<char> wanted(n, 0), spared(n, 0);
             for (std::size_t k = 0; k < n; ++k) {
-                const double nz = std::max(0.0F, level.nz[first + k]), contact = tip + r * (1 - nz);
-                if (nz > std::cos(split) || contact > cut.layer.z_top + 1e-6) continue;
-                if (contact < cut.layer.z_bottom - 0.05 &&
-                    (!above || !leaves_foot(r, nz, *above + r * (1 - nz) - cut.layer.z_bottom,
-                                            cut.job.tolerances.cusp)))
-                    continue;
-                if (floor && (nz < foot_nz || !(*floor)(level.points[first + k]))) continue;
+                const double nz = std::max(0.0F, level.nz[first + k]);
+                const Point2 p = level.points[first + k];
+                if (!in_layer(nz, tips)) continue;
+                if (floor && (nz < std::cos(80 * kDegree) || !(*floor)(p))) continue;
                 wanted[k] = 1;
-                const Point2 a = level.points[first + (k + n - 1) % n], p = level.points[first + k],
-                             b = level.points[first + (k + 1) % n];
+                const Point2 a = level.points[first + (k + n - 1) % n], b = level.points[first + (k + 1) % n];
                 const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y,
                              l = std::hypot(dx, dy);
                 if (l == 0) continue;
                 // The solid is on the right, so the free side is on the left.
                 const std::array<double, 2> out_of{-dy / l, dx / l};
-                if (nz > vertical) {
-                    spared[k] = !cut.job.cutting.uniform_steps &&
-                                edges.made_by_others({to_mm(p.x), to_mm(p.y)}, out_of, nz, tip, above, below);
-                } else if (any_vertical && !flat.stands_over(to_mm(p.x) + out_of[0] * (flat_r - r),
-                                                             to_mm(p.y) + out_of[1] * (flat_r - r), contact))
+                if (nz > vertical_) {
+                    spared[k] = !cut_.job.cutting.uniform_steps &&
+                                edges_->made_by_others({to_mm(p.x), to_mm(p.y)}, out_of, nz, tips.tip,
+                                                       tips.above, tips.below);
+                } else if (any_vertical_ && !flat_->stands_over(to_mm(p.x) + out_of[0] * (flat_r_ - r_),
+                                                                to_mm(p.y) + out_of[1] * (flat_r_ - r_),
+                                                                tips.tip + r_ * (1 - nz)))
                     wanted[k] = 0;
             }
             spare_long(std::span(level.points).subspan(first, n), spared, wanted);
-            append_level_runs(level, c, to_units(tip), wanted, simplify_tolerance_units(gouge), out);
+            append_level_runs(level, c, to_units(tips.tip), wanted,
+                              simplify_tolerance_units(cut_.job.tolerances.gouge), out);
         }
-    };
-    std::vector<std::vector<LevelRun>> runs(tips.size());
-    parallel_each(cut.context, tips.size(), [&](std::size_t i) {
-        append_wanted(contours[i], tips[i], i > 0 ? std::optional(tips[i - 1]) : std::nullopt,
-                      i + 1 < tips.size() ? std::optional(tips[i + 1]) : std::nullopt, nullptr, runs[i]);
-    });
+    }
+    // Whether a contact is steep enough, and made in this layer.
+    [[nodiscard]] bool in_layer(double nz, const Tips& tips) const {
+        const double contact = tips.tip + r_ * (1 - nz);
+        if (nz > std::cos(slopes_.levels_from) || contact > cut_.layer.z_top + 1e-6) return false;
+        return contact >= cut_.layer.z_bottom - 0.05 ||
+               (tips.above && leaves_foot(r_, nz, *tips.above + r_ * (1 - nz) - cut_.layer.z_bottom,
+                                          cut_.job.tolerances.cusp));
+    }
+
     // The foot of a wall on a floor is a hollow: the ball turns from wall to floor within a small part of a
     // step. Levels close above every floor cut what lies there, and only that.
     struct FootLevel {
         double tip;
         std::vector<LevelRun> runs;
     };
-    struct Foot {
-        std::vector<SolidFacet> facets;  // of the floor
-        std::vector<double> close;
-        std::size_t first;  // of its sections
-    };
-    std::vector<Foot> on_floors;
-    std::vector<double> foot_tips;
-    for (const double floor : foot_floors(cut)) {
-        Foot foot{floor_facets(cut, floor), {}, foot_tips.size()};
-        for (double above = tool.stepdown_max / 4; above > 0.02; above /= 2)
-            if (floor + above < high && floor + above > lowest) foot.close.push_back(floor + above);
-        if (foot.close.empty() || foot.facets.empty()) continue;
-        foot_tips.insert(foot_tips.end(), foot.close.begin(), foot.close.end());
-        on_floors.push_back(std::move(foot));
+    [[nodiscard]] std::vector<FootLevel> feet(const FibreGrid& grid) const {
+        struct Foot {
+            std::vector<SolidFacet> facets;  // of the floor
+            std::vector<double> close;
+            std::size_t first;  // of its sections
+        };
+        std::vector<Foot> on_floors;
+        std::vector<double> foot_tips;
+        for (const double floor : foot_floors(cut_)) {
+            Foot foot{floor_facets(cut_, floor), {}, foot_tips.size()};
+            for (double above = tool_.stepdown_max / 4; above > 0.02; above /= 2)
+                if (floor + above < high_ && floor + above > lowest_) foot.close.push_back(floor + above);
+            if (foot.close.empty() || foot.facets.empty()) continue;
+            foot_tips.insert(foot_tips.end(), foot.close.begin(), foot.close.end());
+            on_floors.push_back(std::move(foot));
+        }
+        const std::vector<Section> inside = cut_.insides(cutter_, foot_tips);  // in one look at the mesh
+        std::vector<FootLevel> feet;
+        for (const Foot& foot : on_floors) {
+            const std::vector<double>& close = foot.close;
+            const NearFloor near(cut_, foot.facets, r_, grid);
+            const LayerSolid around =
+                solid_near(cut_.context, cut_.solid, foot.facets, 2 * (r_ + to_mm(grid.pitch)));
+            const std::vector<Contours> level =
+                contours_near(cut_.context, around, close,
+                              std::span(inside).subspan(foot.first, close.size()), cutter_, grid);
+            const std::size_t begin = feet.size();
+            for (const double tip : close) feet.push_back({tip, {}});
+            parallel_each(cut_.context, close.size(), [&](std::size_t i) {
+                append_wanted(level[i], {close[i], std::nullopt, std::nullopt}, &near, feet[begin + i].runs);
+            });
+        }
+        std::stable_sort(feet.begin(), feet.end(),
+                         [](const FootLevel& a, const FootLevel& b) { return a.tip > b.tip; });
+        return feet;
     }
-    const std::vector<Section> foot_inside = cut.insides(cutter, foot_tips);  // in one look at the mesh
-    std::vector<FootLevel> feet;
-    for (const Foot& foot : on_floors) {
-        const std::vector<SolidFacet>& facets = foot.facets;
-        const std::vector<double>& close = foot.close;
-        const NearFloor near(cut, facets, r, grid);
-        const LayerSolid around = solid_near(cut.context, cut.solid, facets, 2 * (r + to_mm(grid.pitch)));
-        const std::vector<Contours> level =
-            contours_near(cut.context, around, close,
-                          std::span(foot_inside).subspan(foot.first, close.size()), cutter, grid);
-        const std::size_t begin = feet.size();
-        for (const double tip : close) feet.push_back({tip, {}});
-        parallel_each(cut.context, close.size(), [&](std::size_t i) {
-            append_wanted(level[i], close[i], std::nullopt, std::nullopt, &near, feet[begin + i].runs);
-        });
-    }
-    std::stable_sort(feet.begin(), feet.end(),
-                     [](const FootLevel& a, const FootLevel& b) { return a.tip > b.tip; });
-    for (FootLevel& foot : feet) runs.push_back(std::move(foot.runs));
-    for (std::size_t i = 0; i < tips.size(); ++i) spaced[i].cuts = !runs[i].empty();
-    op.bands = bands_of(cut, spaced, slopes.levels_keep, tool.stepdown_max);
-    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
-                     cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
-    path.set_surroundings(cut.around(tool, &part));
-    cut_levels(path, cut, tool, part, runs, true);
-    path.finish();
-    return op;
+
+    const LayerCut& cut_;
+    const Tool& tool_;
+    const double r_;
+    const FinishSlopes slopes_;
+    const Cutter cutter_;
+    Operation op_;
+    const double vertical_ = vertical_nz(cut_), flat_r_ = cut_.layer.tools.rough.diameter / 2;
+    bool any_vertical_ = false;  // else nothing goes along walls before, and edges are all that is as steep
+    double low_ = 0, high_ = 0, lowest_ = 0;  // of the walls, and of the tips
+    std::vector<double> tips_;
+    std::vector<SpacedLevel> spaced_;
+    const DropIndex* flat_ = nullptr;
+    const EdgeContacts* edges_ = nullptr;
+};
+
+}  // namespace
+
+Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
+    return LevelContours(cut).run(diagnostics);
 }
 
 }  // namespace slabwright

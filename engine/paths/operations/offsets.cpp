@@ -72,153 +72,197 @@ struct Place {
     bool wanted = false, reachable = false, cut = false;
 };
 
-}  // namespace
+constexpr double kFine = 0.001;  // mm by which an offset's arcs are coarser than arcs
 
-Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
-    const Tool& tool = cut.layer.tools.finish;
-    Operation op = cut.operation(OperationKind::finish, "projected offsets", tool);
-    const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, cusp = cut.job.tolerances.cusp;
-    const FinishSlopes slopes = finish_slopes(cut.job.cutting);
-    if (slopes.projection_to < 0) return op;
-    const double keep_nz = std::cos(slopes.projection_to), step_nz = std::cos(slopes.projection_keep) - 1e-9;
-    constexpr double level_nz = 0.999999;
+// The offsets of one layer.
+class ProjectedOffsets {
+public:
+    explicit ProjectedOffsets(const LayerCut& cut)
+        : cut_(cut),
+          tool_(cut.layer.tools.finish),
+          r_(tool_.diameter / 2),
+          slopes_(finish_slopes(cut.job.cutting)),
+          op_(cut.operation(OperationKind::finish, "projected offsets", tool_)) {}
 
-    const MeshView& mesh = cut.layer.mesh;
-    std::vector<std::uint32_t> chosen;
-    double steepest_nz = 1;  // of those whose cusp decides
-    for (std::size_t f = 0; f < mesh.facets.size(); ++f) {
-        std::array<Vec3d, 3> p;
-        for (int k = 0; k < 3; ++k) {
-            const Vec3f& v = mesh.vertices[mesh.facets[f][k]];
-            p[k] = {v.x, v.y, v.z};
+    Operation run(std::vector<Diagnostic>& diagnostics) {
+        if (slopes_.projection_to < 0) return op_;
+        const std::vector<std::uint32_t> chosen = shallow_facets();
+        if (chosen.empty()) return op_;
+        choose_step(diagnostics);
+        const std::vector<Loops> curves = curves_in(chosen);
+        const DropIndex ball(cut_.solid, {Cutter::Profile::ball, r_});
+        const DropIndex flat(cut_.solid, {Cutter::Profile::flat, cut_.layer.tools.rough.diameter / 2 - 0.02});
+        ball_ = &ball, flat_ = &flat;
+        const Slide slide{&ball, true, chord_, cut_.layer.z_top, 3};
+        std::vector<std::vector<std::vector<PathPoint>>> runs(curves.size());
+        parallel_each(cut_.context, curves.size(), [&](std::size_t c) {
+            for (std::size_t l = 0; l + 1 < curves[c].starts.size(); ++l)
+                append_runs(curves[c].loop(l), slide, runs[c]);
+        });
+        std::vector<std::vector<PathPoint>> inwards;
+        for (auto& group : runs)
+            for (auto& run : group) inwards.push_back(std::move(run));
+        PathBuilder path(op_, tool_, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed),
+                         cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
+        path.set_surroundings(cut_.around(tool_, &ball));
+        follow_nearest(path, chained(std::move(inwards), slide));
+        path.finish();
+        return std::move(op_);
+    }
+
+private:
+    // The facets that the ball finishes by projection.
+    std::vector<std::uint32_t> shallow_facets() {
+        const double step_nz = std::cos(slopes_.projection_keep) - 1e-9;
+        const MeshView& mesh = cut_.layer.mesh;
+        std::vector<std::uint32_t> chosen;
+        for (std::size_t f = 0; f < mesh.facets.size(); ++f) {
+            std::array<Vec3d, 3> p;
+            for (int k = 0; k < 3; ++k) {
+                const Vec3f& v = mesh.vertices[mesh.facets[f][k]];
+                p[k] = {v.x, v.y, v.z};
+            }
+            const auto [low, high] = std::minmax({p[0][2], p[1][2], p[2][2]});
+            if (high <= cut_.layer.z_bottom || low >= cut_.layer.z_top) continue;
+            const Vec3d a{p[1][0] - p[0][0], p[1][1] - p[0][1], p[1][2] - p[0][2]},
+                b{p[2][0] - p[0][0], p[2][1] - p[0][1], p[2][2] - p[0][2]};
+            const Vec3d n{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+            const double area = std::hypot(n[0], n[1], n[2]), nz = area > 0 ? n[2] / area : -1;
+            if (nz < keep_nz_) continue;
+            chosen.push_back(static_cast<std::uint32_t>(f));
+            if (nz >= step_nz) steepest_nz_ = std::min(steepest_nz_, nz);
         }
-        const auto [low, high] = std::minmax({p[0][2], p[1][2], p[2][2]});
-        if (high <= cut.layer.z_bottom || low >= cut.layer.z_top) continue;
-        const Vec3d a{p[1][0] - p[0][0], p[1][1] - p[0][1], p[1][2] - p[0][2]},
-            b{p[2][0] - p[0][0], p[2][1] - p[0][1], p[2][2] - p[0][2]};
-        const Vec3d n{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-        const double area = std::hypot(n[0], n[1], n[2]), nz = area > 0 ? n[2] / area : -1;
-        if (nz < keep_nz) continue;
-        chosen.push_back(static_cast<std::uint32_t>(f));
-        if (nz >= step_nz) steepest_nz = std::min(steepest_nz, nz);
-    }
-    if (chosen.empty()) return op;
-    double d = raster_stepover(r, cusp, std::sqrt(std::max(0.0, 1 - steepest_nz * steepest_nz)));
-    if (d < cut.job.cutting.min_stepover) {
-        d = cut.job.cutting.min_stepover;
-        diagnostics.push_back(
-            {Severity::warning,
-             "finish.stepover_floor",
-             fmt::format(
-                 "layer {}: the offsets' step-over was kept at {:.2f} mm, cusps there exceed {:.3f} mm",
-                 cut.layer.index, d, cusp),
-             {}});
-    }
-    op.stepover = d;
-
-    // The ball stands beside its contact, so its places reach past the border by that much.
-    Loops travel;
-    for (const auto& [x, y] : {std::pair{cut.low(0, r), cut.low(1, r)},
-                               {cut.high(0, r), cut.low(1, r)},
-                               {cut.high(0, r), cut.high(1, r)},
-                               {cut.low(0, r), cut.high(1, r)}})
-        travel.points.push_back({to_units(x), to_units(y)});
-    travel.close_loop();
-    constexpr double fine = 0.001;
-    const Loops region =
-        intersect(offset(outline(mesh, chosen), r * std::sqrt(1 - keep_nz * keep_nz), fine), travel);
-    const double across = std::hypot(cut.high(0, r) - cut.low(0, r), cut.high(1, r) - cut.low(1, r));
-    std::vector<Loops> curves;
-    Loops outer = region;
-    for (int k = 1; !outer.empty() && (k - 1) * d <= across; ++k) {
-        Loops inner = offset(region, -k * d, fine);
-        // What lies farther than half a step from both curves, in their corners and where the inner one ends:
-        // once around it.
-        const Loops far = subtract(offset(outer, -d / 2, fine), offset(inner, d / 2, fine));
-        Loops between = offset(offset(far, -0.02, fine), 0.02, fine);
-        curves.push_back(std::move(outer));
-        if (!between.empty()) curves.push_back(std::move(between));
-        outer = std::move(inner);
+        return chosen;
     }
 
-    const DropIndex ball(cut.solid, {Cutter::Profile::ball, r});
-    const DropIndex flat(cut.solid, {Cutter::Profile::flat, cut.layer.tools.rough.diameter / 2 - 0.02});
-    const double chord = safe_chord_mm(r, gouge);
-    auto floor_done = [&](double z) {
-        return std::any_of(cut.floors.begin(), cut.floors.end(),
+    void choose_step(std::vector<Diagnostic>& diagnostics) {
+        const double cusp = cut_.job.tolerances.cusp;
+        step_ = raster_stepover(r_, cusp, std::sqrt(std::max(0.0, 1 - steepest_nz_ * steepest_nz_)));
+        if (step_ < cut_.job.cutting.min_stepover) {
+            step_ = cut_.job.cutting.min_stepover;
+            diagnostics.push_back(
+                {Severity::warning,
+                 "finish.stepover_floor",
+                 fmt::format(
+                     "layer {}: the offsets' step-over was kept at {:.2f} mm, cusps there exceed {:.3f} mm",
+                     cut_.layer.index, step_, cusp),
+                 {}});
+        }
+        op_.stepover = step_;
+    }
+
+    // Offsets of the facets' outline, inwards, and what they leave between them.
+    [[nodiscard]] std::vector<Loops> curves_in(const std::vector<std::uint32_t>& chosen) const {
+        // The ball stands beside its contact, so its places reach past the border by that much.
+        Loops travel;
+        for (const auto& [x, y] : {std::pair{cut_.low(0, r_), cut_.low(1, r_)},
+                                   {cut_.high(0, r_), cut_.low(1, r_)},
+                                   {cut_.high(0, r_), cut_.high(1, r_)},
+                                   {cut_.low(0, r_), cut_.high(1, r_)}})
+            travel.points.push_back({to_units(x), to_units(y)});
+        travel.close_loop();
+        const Loops region = intersect(
+            offset(outline(cut_.layer.mesh, chosen), r_ * std::sqrt(1 - keep_nz_ * keep_nz_), kFine), travel);
+        const double across =
+            std::hypot(cut_.high(0, r_) - cut_.low(0, r_), cut_.high(1, r_) - cut_.low(1, r_));
+        std::vector<Loops> curves;
+        Loops outer = region;
+        for (int k = 1; !outer.empty() && (k - 1) * step_ <= across; ++k) {
+            Loops inner = offset(region, -k * step_, kFine);
+            // What lies farther than half a step from both curves, in their corners and where the inner one
+            // ends: once around it.
+            const Loops far = subtract(offset(outer, -step_ / 2, kFine), offset(inner, step_ / 2, kFine));
+            Loops between = offset(offset(far, -0.02, kFine), 0.02, kFine);
+            curves.push_back(std::move(outer));
+            if (!between.empty()) curves.push_back(std::move(between));
+            outer = std::move(inner);
+        }
+        return curves;
+    }
+
+    [[nodiscard]] bool is_floor(double z) const {
+        return std::any_of(cut_.floors.begin(), cut_.floors.end(),
                            [&](double floor) { return z <= floor + 1e-6 && z >= floor - kSameFloor; });
-    };
-    auto place = [&](Point2 at) {
+    }
+    [[nodiscard]] Place place(Point2 at) const {
+        constexpr double level_nz = 0.999999;
         const double x = to_mm(at.x), y = to_mm(at.y);
-        const Rest rest = ball.drop(x, y);
-        const double contact = rest.contact_z(r);
-        Place p{at.x, at.y, 0, rest.tip_z, false, rest.tip_z >= cut.layer.floor_below && !rest.on_cap, false};
-        p.wanted = p.reachable && rest.nz >= keep_nz && contact >= cut.layer.z_bottom - 0.02 &&
-                   contact < cut.layer.z_top - 1e-6;
-        if (p.wanted && rest.nz > level_nz && floor_done(contact) && !flat.stands_over(x, y, contact + 1e-3))
+        const Rest rest = ball_->drop(x, y);
+        const double contact = rest.contact_z(r_);
+        Place p{at.x, at.y, 0, rest.tip_z, false, rest.tip_z >= cut_.layer.floor_below && !rest.on_cap,
+                false};
+        p.wanted = p.reachable && rest.nz >= keep_nz_ && contact >= cut_.layer.z_bottom - 0.02 &&
+                   contact < cut_.layer.z_top - 1e-6;
+        if (p.wanted && rest.nz > level_nz && is_floor(contact) && !flat_->stands_over(x, y, contact + 1e-3))
             p.wanted = false;
         if (p.reachable) p.z = to_units(p.tip) + 1;
         return p;
-    };
-    const std::int32_t finest = to_units(0.02);
-    auto append_places = [&](auto&& self, std::vector<Place>& line, const Place& b) -> void {
+    }
+    void append_places(std::vector<Place>& line, const Place& b) const {
+        const std::int32_t finest = to_units(0.02);
         if (!line.empty()) {
             const Place& a = line.back();
             const double way = std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
             const bool both = a.reachable && b.reachable;
-            const bool apart = way > 0.75 * chord * kUnitsPerMm ||
+            const bool apart = way > 0.75 * chord_ * kUnitsPerMm ||
                                (way > 2 * finest && (both ? std::hypot(to_mm(static_cast<std::int64_t>(way)),
-                                                                       a.tip - b.tip) > chord
+                                                                       a.tip - b.tip) > chord_
                                                           : a.reachable != b.reachable));
             if (apart) {
-                self(self, line, place({a.x + (b.x - a.x) / 2, a.y + (b.y - a.y) / 2}));
-                self(self, line, b);
+                append_places(line, place({a.x + (b.x - a.x) / 2, a.y + (b.y - a.y) / 2}));
+                append_places(line, b);
                 return;
             }
         }
         line.push_back(b);
-    };
-    const Slide slide{&ball, true, chord, cut.layer.z_top, 3};
-    std::vector<std::vector<std::vector<PathPoint>>> runs(curves.size());
-    parallel_each(cut.context, curves.size(), [&](std::size_t c) {
-        const Loops& loops = curves[c];
-        for (std::size_t l = 0; l + 1 < loops.starts.size(); ++l) {
-            std::vector<Place> ring;
-            for (std::size_t k = loops.starts[l]; k < loops.starts[l + 1]; ++k)
-                append_places(append_places, ring, place(loops.points[k]));
-            append_places(append_places, ring, Place(ring.front()));
-            ring.pop_back();
-            const std::size_t n = ring.size();
-            std::size_t start = n;
-            for (std::size_t k = 0; k < n; ++k) {
-                ring[k].cut = ring[k].wanted || (ring[k].reachable &&
-                                                 (ring[(k + 1) % n].wanted || ring[(k + n - 1) % n].wanted));
-                if (!ring[k].cut && start == n) start = k;
-            }
-            const bool closed = start == n;
-            std::vector<PathPoint> run;
-            auto close = [&] {
-                if (run.size() > 1) runs[c].push_back(simplify(run, simplify_tolerance_units(gouge)));
-                run.clear();
-            };
-            for (std::size_t k = 0; k < n + (closed ? 1 : 0); ++k) {
-                const Place& p = ring[(start + k) % n];
-                if (p.cut) append_free(run, {p.x, p.y, p.z}, slide);
-                else close();
-            }
-            close();
-        }
-    });
-    std::vector<std::vector<PathPoint>> inwards;
-    for (auto& group : runs)
-        for (auto& run : group) inwards.push_back(std::move(run));
+    }
 
-    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
-                     cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
-    path.set_surroundings(cut.around(tool, &ball));
-    follow_nearest(path, chained(std::move(inwards), slide));
-    path.finish();
-    return op;
+    // The stretches of a loop on which the ball has something to make.
+    void append_runs(std::span<const Point2> loop, const Slide& slide,
+                     std::vector<std::vector<PathPoint>>& runs) const {
+        std::vector<Place> ring;
+        for (const Point2 p : loop) append_places(ring, place(p));
+        append_places(ring, Place(ring.front()));
+        ring.pop_back();
+        const std::size_t n = ring.size();
+        std::size_t start = n;
+        for (std::size_t k = 0; k < n; ++k) {
+            ring[k].cut = ring[k].wanted ||
+                          (ring[k].reachable && (ring[(k + 1) % n].wanted || ring[(k + n - 1) % n].wanted));
+            if (!ring[k].cut && start == n) start = k;
+        }
+        const bool closed = start == n;
+        std::vector<PathPoint> run;
+        auto close = [&] {
+            if (run.size() > 1)
+                runs.push_back(simplify(run, simplify_tolerance_units(cut_.job.tolerances.gouge)));
+            run.clear();
+        };
+        for (std::size_t k = 0; k < n + (closed ? 1 : 0); ++k) {
+            const Place& p = ring[(start + k) % n];
+            if (p.cut) append_free(run, {p.x, p.y, p.z}, slide);
+            else close();
+        }
+        close();
+    }
+
+    const LayerCut& cut_;
+    const Tool& tool_;
+    const double r_;
+    const FinishSlopes slopes_;
+    Operation op_;
+    const double keep_nz_ = std::cos(slopes_.projection_to);
+    const double chord_ = safe_chord_mm(r_, cut_.job.tolerances.gouge);
+    double steepest_nz_ = 1;  // of the facets whose cusp decides
+    double step_ = 0;         // mm
+    const DropIndex* ball_ = nullptr;
+    const DropIndex* flat_ = nullptr;
+};
+
+}  // namespace
+
+Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
+    return ProjectedOffsets(cut).run(diagnostics);
 }
 
 }  // namespace slabwright
