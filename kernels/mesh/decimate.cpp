@@ -68,6 +68,83 @@ Vector vector_of(const Vec3f& v) { return {v.x, v.y, v.z}; }
 
 Vector cross_of(const Vector& p, const Vector& q, const Vector& r) { return (q - p).cross(r - p); }
 
+// The cells of a grid by their keys, numbered as they come.
+class CellTable {
+public:
+    // @returns the cell's number; a new one is the next
+    std::uint32_t number(std::uint64_t key, std::uint64_t hash) {
+        std::size_t slot = slot_of(key, hash);
+        if (table_[slot] != kEmpty) return table_[slot];
+        const auto id = static_cast<std::uint32_t>(keys_.size());
+        table_[slot] = id;
+        keys_.push_back(key);
+        hashes_.push_back(hash);
+        // Cells are many fewer than vertices, so that the table begins small and grows.
+        if (2 * keys_.size() > table_.size()) {
+            table_.assign(2 * table_.size(), kEmpty);
+            for (std::uint32_t k = 0; k < keys_.size(); ++k) table_[slot_of(keys_[k], hashes_[k])] = k;
+        }
+        return id;
+    }
+    [[nodiscard]] std::size_t size() const { return keys_.size(); }
+
+private:
+    static constexpr std::uint32_t kEmpty = 0xFFFFFFFFu;
+    [[nodiscard]] std::size_t slot_of(std::uint64_t key, std::uint64_t hash) const {
+        std::size_t slot = (hash >> 16) & (table_.size() - 1);
+        while (table_[slot] != kEmpty && keys_[table_[slot]] != key) slot = (slot + 1) & (table_.size() - 1);
+        return slot;
+    }
+    std::vector<std::uint32_t> table_ = std::vector<std::uint32_t>(kLeastTable, kEmpty);
+    std::vector<std::uint64_t> keys_, hashes_;
+};
+
+std::array<Vector, 3> corners_of(MeshView mesh, std::size_t f) {
+    const Index3& v = mesh.facets[f];
+    return {vector_of(mesh.vertices[v[0]]), vector_of(mesh.vertices[v[1]]), vector_of(mesh.vertices[v[2]])};
+}
+
+// A grid of which about `aim` facets meet their own cell each.
+class ClusterGrid {
+public:
+    ClusterGrid(Context& context, MeshView mesh, std::size_t aim) {
+        constexpr std::size_t sampled = 16;
+        const double area = sampled * parallel_reduce(
+                                          context, mesh.facets.size() / sampled, kGrain, 0.0,
+                                          [&](std::size_t begin, std::size_t end) {
+                                              double sum = 0;
+                                              for (std::size_t f = begin; f < end; ++f) {
+                                                  const std::array<Vector, 3> c =
+                                                      corners_of(mesh, f * sampled);
+                                                  sum += cross_of(c[0], c[1], c[2]).norm() / 2;
+                                              }
+                                              return sum;
+                                          },
+                                          [](double x, double y) { return x + y; });
+        const Box3 box = bounds(context, mesh);
+        low_ = vector_of(box.min);
+        cell_ = std::max({1e-6, std::sqrt(2 * area / static_cast<double>(aim)),
+                          (vector_of(box.max) - low_).maxCoeff() / kMostCells});
+        per_cell_ = 1 / cell_;
+    }
+    [[nodiscard]] double cell() const { return cell_; }  // mm
+    [[nodiscard]] std::uint64_t key_of(const Vec3f& v) const {
+        const Vector at = (vector_of(v) - low_) * per_cell_;
+        const auto share = [&](int k) {
+            return static_cast<std::uint64_t>(std::clamp(at[k], 0.0, kMostCells));
+        };
+        return share(0) << 42 | share(1) << 21 | share(2);
+    }
+    static std::uint64_t hash_of(std::uint64_t key) { return key * 0x9E3779B97F4A7C15u; }
+    static std::size_t part_of(std::uint64_t key) {
+        return static_cast<std::size_t>(hash_of(key) >> (64 - kPartBits));
+    }
+
+private:
+    Vector low_;
+    double cell_ = 0, per_cell_ = 0;
+};
+
 class Decimation {
 public:
     Decimation(Context& context, MeshView mesh, std::size_t clustered_from) : context_(context) {
@@ -120,40 +197,13 @@ private:
     /// @param aim facets that the grid aims at
     void cluster(MeshView mesh, std::size_t aim) {
         charge_.emplace(context_, 12 * mesh.vertices.size() + 100 * aim, kWhat);
-        const auto corners = [&](std::size_t f) {
-            const Index3& v = mesh.facets[f];
-            return std::array<Vector, 3>{vector_of(mesh.vertices[v[0]]), vector_of(mesh.vertices[v[1]]),
-                                         vector_of(mesh.vertices[v[2]])};
-        };
-        constexpr std::size_t sampled = 16;
-        const double area = sampled * parallel_reduce(
-                                          context_, mesh.facets.size() / sampled, kGrain, 0.0,
-                                          [&](std::size_t begin, std::size_t end) {
-                                              double sum = 0;
-                                              for (std::size_t f = begin; f < end; ++f) {
-                                                  const std::array<Vector, 3> c = corners(f * sampled);
-                                                  sum += cross_of(c[0], c[1], c[2]).norm() / 2;
-                                              }
-                                              return sum;
-                                          },
-                                          [](double x, double y) { return x + y; });
-        const Box3 box = bounds(context_, mesh);
-        const Vector low = vector_of(box.min);
-        const double cell = std::max({1e-6, std::sqrt(2 * area / static_cast<double>(aim)),
-                                      (vector_of(box.max) - low).maxCoeff() / kMostCells});
-        const double per_cell = 1 / cell;
-        const auto cell_of = [&](const Vec3f& v) {
-            const Vector at = (vector_of(v) - low) * per_cell;
-            const auto share = [&](int k) {
-                return static_cast<std::uint64_t>(std::clamp(at[k], 0.0, kMostCells));
-            };
-            return share(0) << 42 | share(1) << 21 | share(2);
-        };
-        const auto hash_of = [](std::uint64_t key) { return key * 0x9E3779B97F4A7C15u; };
-        const auto part_of = [&](std::uint64_t key) {
-            return static_cast<std::size_t>(hash_of(key) >> (64 - kPartBits));
-        };
+        const ClusterGrid grid(context_, mesh, aim);
+        const std::vector<std::uint32_t> source = merge_facets(mesh, merge_vertices(mesh, grid));
+        place_by_planes(mesh, source, grid.cell());
+    }
 
+    /// Makes vertices_ the means of those in a cell. @returns by the mesh's vertices, those that they become
+    RawArray<std::uint32_t> merge_vertices(MeshView mesh, const ClusterGrid& grid) {
         // Vertices are dealt by their cell's hash into parts, of which each numbers its cells as they come.
         struct Item {
             std::uint64_t key;
@@ -170,12 +220,12 @@ private:
                 context_, n, std::max(kGrain, n / 64 + 1), parts,
                 [&](std::size_t begin, std::size_t end, auto&& take) {
                     for (std::size_t i = begin; i < end; ++i)
-                        take(part_of(cells[i] = cell_of(mesh.vertices[i])));
+                        take(ClusterGrid::part_of(cells[i] = grid.key_of(mesh.vertices[i])));
                 },
                 [&](std::size_t begin, std::size_t end, auto&& take) {
                     for (std::size_t i = begin; i < end; ++i) {
                         const std::uint64_t key = cells[i];
-                        take(part_of(key), Item{key, static_cast<std::uint32_t>(i)});
+                        take(ClusterGrid::part_of(key), Item{key, static_cast<std::uint32_t>(i)});
                     }
                 },
                 [&](std::uint64_t total, std::uint64_t largest) {
@@ -186,33 +236,15 @@ private:
                 },
                 [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
                     parallel_each(context_, last - first, [&](std::size_t p) {
-                        constexpr std::uint32_t empty = 0xFFFFFFFFu;
                         const std::span<const Item> mine(dealt.data() + starts[p], starts[p + 1] - starts[p]);
-                        // Cells are many fewer than vertices, so that the table begins small and grows.
-                        std::vector<std::uint32_t> table(kLeastTable, empty);
-                        std::vector<std::uint64_t> keys;
+                        CellTable table;
                         std::vector<std::uint32_t> counts;
                         std::vector<Vector>& sums = means[first + p];
-                        const auto slot_of = [&](std::uint64_t key) {
-                            std::size_t slot = (hash_of(key) >> 16) & (table.size() - 1);
-                            while (table[slot] != empty && keys[table[slot]] != key)
-                                slot = (slot + 1) & (table.size() - 1);
-                            return slot;
-                        };
                         for (const Item& item : mine) {
-                            const std::size_t slot = slot_of(item.key);
-                            const std::uint32_t id =
-                                table[slot] != empty ? table[slot] : static_cast<std::uint32_t>(keys.size());
-                            if (table[slot] == empty) {
-                                table[slot] = id;
-                                keys.push_back(item.key);
+                            const std::uint32_t id = table.number(item.key, ClusterGrid::hash_of(item.key));
+                            if (id == sums.size()) {
                                 sums.push_back(Vector::Zero());
                                 counts.push_back(0);
-                                if (2 * keys.size() > table.size()) {
-                                    table.assign(2 * table.size(), empty);
-                                    for (std::uint32_t k = 0; k < keys.size(); ++k)
-                                        table[slot_of(keys[k])] = k;
-                                }
                             }
                             sums[id] += vector_of(mesh.vertices[item.vertex]);
                             ++counts[id];
@@ -229,9 +261,13 @@ private:
             std::vector<Vector>().swap(means[p]);
         }
         parallel_for(context_, n, kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) to[i] += before[part_of(cells[i])];
+            for (std::size_t i = begin; i < end; ++i) to[i] += before[ClusterGrid::part_of(cells[i])];
         });
+        return to;
+    }
 
+    /// Makes facets_ those whose corners are three vertices. @returns by these, the mesh's
+    std::vector<std::uint32_t> merge_facets(MeshView mesh, const RawArray<std::uint32_t>& to) {
         std::vector<std::vector<std::uint32_t>> staying((mesh.facets.size() + kGrain - 1) / kGrain);
         const auto merged = [&](std::size_t f) {
             const Index3& v = mesh.facets[f];
@@ -245,6 +281,14 @@ private:
         for (const std::vector<std::uint32_t>& some : staying)
             source.insert(source.end(), some.begin(), some.end());
         facets_.resize(source.size());
+        parallel_for(context_, source.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) facets_[i] = merged(source[i]);
+        });
+        return source;
+    }
+
+    /// Moves vertices to where the planes of their facets want them, unless they lie well. @param cell mm
+    void place_by_planes(MeshView mesh, std::span<const std::uint32_t> source, double cell) {
         struct Oriented {
             Vector normal, place;
             double twice_area;
@@ -252,8 +296,7 @@ private:
         std::vector<Oriented> planes(source.size());
         parallel_for(context_, source.size(), 4096, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
-                facets_[i] = merged(source[i]);
-                const std::array<Vector, 3> c = corners(source[i]);
+                const std::array<Vector, 3> c = corners_of(mesh, source[i]);
                 const Vector normal = cross_of(c[0], c[1], c[2]);
                 const double twice = normal.norm();
                 planes[i] = {twice > 0 ? Vector(normal / twice) : Vector(Vector::Zero()), c[0], twice};

@@ -163,18 +163,9 @@ std::vector<int> material_around(Context& context, MeshView mesh, std::span<cons
     return result;
 }
 
-}  // namespace
-
-MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::uint32_t>* odd) {
-    MeshReport report;
-    report.facets = mesh.size();
-    report.vertices = mesh.vertices.size();
-    report.box = bounds(context, mesh);
-    const float base = report.box.min.z;
+// Facets that share an edge are joined into components, by their roots.
+void join_components(Context& context, MeshView mesh, std::span<std::uint32_t> component) {
     const std::size_t n = mesh.size();
-
-    report.component_of.resize(n);
-    const std::span<std::uint32_t> component(report.component_of);
     parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t f = begin; f < end; ++f) component[f] = static_cast<std::uint32_t>(f);
     });
@@ -183,6 +174,11 @@ MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::u
             for (const std::uint32_t g : mesh.neighbours[f])
                 if (g != kNoFacet && g < f) join_clusters(component, static_cast<std::uint32_t>(f), g);
     });
+}
+
+// @param odd the vertices whose edges are asked; null: all
+EdgeFindings find_edges(Context& context, MeshView mesh, float base, const std::vector<std::uint32_t>* odd,
+                        std::span<std::uint32_t> component) {
     EdgeFindings edges;
     if (odd == nullptr || !odd->empty()) {
         std::vector<bool> asked(odd == nullptr ? 0 : mesh.vertices.size(), false);
@@ -199,31 +195,18 @@ MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::u
             },
             join);
     }
-    report.open_edges = edges.open;
-    report.open_edges_off_base = edges.open_off_base;
-    report.non_manifold_edges = edges.non_manifold;
-    report.misoriented_edges = edges.misoriented;
-    report.duplicate_facets = edges.duplicate;
+    return edges;
+}
 
-    // Paths are flattened into a second array: reading and writing one array would let threads see each
-    // other's work.
-    {
-        BulkVector<std::uint32_t> roots(n);
-        parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t f = begin; f < end; ++f)
-                roots[f] = cluster_root(component, static_cast<std::uint32_t>(f));
-        });
-        report.component_of = std::move(roots);
-    }
-    report.components = number_by_first(
-        context, report.component_of, [](std::uint32_t) {}, [](std::size_t, std::uint32_t) {});
-
+// Area, volumes by component, degenerate facets, and which components are open off the base.
+Sums sum_up(Context& context, MeshView mesh, const MeshReport& report) {
+    const float base = report.box.min.z;
     // Volume is summed from tetrahedra to the middle of the base: exact for a mesh that is open in its base
     // plane only, and without loss of digits for a mesh far from the origin.
     const Vec3d origin{(double(report.box.min.x) + report.box.max.x) / 2,
                        (double(report.box.min.y) + report.box.max.y) / 2, base};
-    const Sums sums = parallel_reduce(
-        context, n, kGrain, Sums{},
+    return parallel_reduce(
+        context, mesh.size(), kGrain, Sums{},
         [&](std::size_t begin, std::size_t end) {
             Sums part;
             for (std::size_t f = begin; f < end; ++f) {
@@ -252,28 +235,20 @@ MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::u
             a.open.insert(a.open.end(), b.open.begin(), b.open.end());
             return a;
         });
-    report.degenerate_facets = sums.degenerate;
-    report.area_mm2 = sums.area;
-    std::vector<double> volume(report.components, 0);
-    std::vector<bool> open(report.components, false);
-    for (const Run& run : sums.runs) {
-        volume[run.component] += run.volume;
-        report.volume_mm3 += run.volume;
-    }
-    for (const std::uint32_t c : sums.open) open[c] = true;
+}
 
+// Components whose outside is in. @param may_be by component: whether it may be one
+void find_inverted(Context& context, MeshView mesh, std::vector<std::uint32_t> may_be, MeshReport& report) {
     // One query per component that may be inverted: the centroid of its first facet with an area.
-    std::vector<std::uint32_t> asked(report.components, 0);
-    for (std::size_t c = 0; c < asked.size(); ++c) asked[c] = !open[c] && volume[c] < 0;
     std::vector<Query> queries;
     std::vector<std::uint32_t> first_facets;
-    if (std::find(asked.begin(), asked.end(), 1u) != asked.end()) {
-        for (std::size_t f = 0; f < n; ++f) {
+    if (std::find(may_be.begin(), may_be.end(), 1u) != may_be.end()) {
+        for (std::size_t f = 0; f < mesh.size(); ++f) {
             const std::uint32_t c = report.component_of[f];
-            if (asked[c] == 0) continue;
+            if (may_be[c] == 0) continue;
             const Vec3d area = twice_area(mesh, mesh.facets[f]);
             if (dot(area, area) == 0) continue;
-            asked[c] = 0;
+            may_be[c] = 0;
             Query query{{}, c};
             for (const std::uint32_t v : mesh.facets[f]) {
                 query.p[0] += mesh.vertices[v].x / 3.0;
@@ -287,6 +262,55 @@ MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::u
     const std::vector<int> winding = material_around(context, mesh, report.component_of, queries);
     for (std::size_t i = 0; i < queries.size(); ++i)
         if (winding[i] <= 0) note(report.inverted_components, first_facets[i]);
+}
+
+}  // namespace
+
+MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::uint32_t>* odd) {
+    MeshReport report;
+    report.facets = mesh.size();
+    report.vertices = mesh.vertices.size();
+    report.box = bounds(context, mesh);
+    const float base = report.box.min.z;
+    const std::size_t n = mesh.size();
+
+    report.component_of.resize(n);
+    join_components(context, mesh, report.component_of);
+    const EdgeFindings edges = find_edges(context, mesh, base, odd, report.component_of);
+    report.open_edges = edges.open;
+    report.open_edges_off_base = edges.open_off_base;
+    report.non_manifold_edges = edges.non_manifold;
+    report.misoriented_edges = edges.misoriented;
+    report.duplicate_facets = edges.duplicate;
+
+    // Paths are flattened into a second array: reading and writing one array would let threads see each
+    // other's work.
+    {
+        const std::span<std::uint32_t> component(report.component_of);
+        BulkVector<std::uint32_t> roots(n);
+        parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t f = begin; f < end; ++f)
+                roots[f] = cluster_root(component, static_cast<std::uint32_t>(f));
+        });
+        report.component_of = std::move(roots);
+    }
+    report.components = number_by_first(
+        context, report.component_of, [](std::uint32_t) {}, [](std::size_t, std::uint32_t) {});
+
+    const Sums sums = sum_up(context, mesh, report);
+    report.degenerate_facets = sums.degenerate;
+    report.area_mm2 = sums.area;
+    std::vector<double> volume(report.components, 0);
+    std::vector<bool> open(report.components, false);
+    for (const Run& run : sums.runs) {
+        volume[run.component] += run.volume;
+        report.volume_mm3 += run.volume;
+    }
+    for (const std::uint32_t c : sums.open) open[c] = true;
+
+    std::vector<std::uint32_t> may_be_inverted(report.components, 0);
+    for (std::size_t c = 0; c < may_be_inverted.size(); ++c) may_be_inverted[c] = !open[c] && volume[c] < 0;
+    find_inverted(context, mesh, std::move(may_be_inverted), report);
     return report;
 }
 

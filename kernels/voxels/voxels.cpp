@@ -342,6 +342,125 @@ double LayerVoxels::reached_share(Context& context, double radius, int every) {
     return all > 0 ? static_cast<double>(touched) / static_cast<double>(all) : 1;
 }
 
+namespace {
+
+struct Piece {
+    openvdb::Coord at;
+    std::unique_ptr<Leaf> leaf;
+};
+
+// Leaves of what is left: strips of eight rows and eight slices in parallel, in their order.
+// @param kept by slice. @param level by slice the slice of its level's tip, −1: none. @param gone by level
+std::vector<std::vector<Piece>> leaves_of(Context& context, const VoxelBox& box, int border,
+                                          std::span<const CellRows> kept, std::span<const int> level,
+                                          const std::map<int, CellRows>& gone) {
+    const int strips = (box.ny + kLeaf - 1) / kLeaf, bands = (box.nz + kLeaf - 1) / kLeaf,
+              columns = (box.nx + kLeaf - 1) / kLeaf;
+    std::vector<std::vector<Piece>> pieces(static_cast<std::size_t>(strips) * bands);
+    parallel_for(context, pieces.size(), 16, [&](std::size_t begin, std::size_t end) {
+        std::vector<std::unique_ptr<Leaf>> open(static_cast<std::size_t>(columns));
+        std::vector<std::array<std::int32_t, 2>> both, rest;
+        for (std::size_t p = begin; p < end; ++p) {
+            const int j0 = static_cast<int>(p) % strips * kLeaf, k0 = static_cast<int>(p) / strips * kLeaf;
+            for (int k = k0; k < std::min(k0 + kLeaf, box.nz); ++k)
+                for (int j = j0; j < std::min(j0 + kLeaf, box.ny); ++j) {
+                    const auto row = slot(j + border);
+                    const int at = level[static_cast<std::size_t>(k)];
+                    both.clear();
+                    rest.clear();
+                    append_union(kept[static_cast<std::size_t>(k)].row(row),
+                                 at < 0 ? Spans{} : gone.at(at).row(row), both);
+                    append_rest(both, border, border + box.nx - 1, rest);
+                    for (const auto& s : rest)
+                        for (int c = (s[0] - border) / kLeaf; c <= (s[1] - border) / kLeaf; ++c) {
+                            std::unique_ptr<Leaf>& leaf = open[static_cast<std::size_t>(c)];
+                            if (!leaf) leaf = std::make_unique<Leaf>(openvdb::Coord(k0, j0, c * kLeaf));
+                            const std::array<std::int32_t, 2> run{s[0] - border, s[1] - border};
+                            slice_of(*leaf, k - k0) |=
+                                std::uint64_t{covered(std::span(&run, 1), c * kLeaf, 0)} << (8 * (j - j0));
+                        }
+                }
+            for (std::unique_ptr<Leaf>& leaf : open)
+                if (leaf) pieces[p].push_back({leaf->origin(), std::move(leaf)});
+        }
+    });
+    return pieces;
+}
+
+// Frees leaves of what lies within the swath (mm) of what is kept, sideways at its height and straight above
+// it.
+void free_of_swath(Context& context, const VoxelBox& box, int border, std::span<const CellRows> kept,
+                   double swath, std::span<Leaf* const> leaves) {
+    const double reach = swath / box.voxel + 0.5;
+    std::vector<int> width;
+    for (int dy = 0; half_width(reach, dy) >= 0; ++dy) width.push_back(half_width(reach, dy));
+    const int below = static_cast<int>(std::floor(swath / box.voxel + 1e-6)), rows = box.ny + 2 * border;
+    parallel_for(context, leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t l = begin; l < end; ++l)
+            for (int dk = 0; dk < kLeaf; ++dk) {
+                std::uint64_t& slice = slice_of(*leaves[l], dk);
+                if (slice == 0) continue;
+                const auto [k, j0, i0] =
+                    std::array{leaves[l]->origin().x() + dk, leaves[l]->origin().y() + border,
+                               leaves[l]->origin().z() + border};
+                const CellRows &of_slice = kept[static_cast<std::size_t>(k)],
+                               &under = kept[static_cast<std::size_t>(std::max(0, k - below))];
+                for (int dj = 0; dj < kLeaf; ++dj) {
+                    auto cells = static_cast<std::uint8_t>(slice >> (8 * dj));
+                    if (cells == 0) continue;
+                    const std::uint8_t before = cells;
+                    const int j = j0 + dj;
+                    cells &=
+                        static_cast<std::uint8_t>(~covered(under.row(static_cast<std::size_t>(j)), i0, 0));
+                    for (int dy = 0; dy < static_cast<int>(width.size()) && cells != 0; ++dy)
+                        for (const int row : {j - dy, j + dy})
+                            if (row >= 0 && row < rows)
+                                cells &= static_cast<std::uint8_t>(
+                                    ~covered(of_slice.row(static_cast<std::size_t>(row)), i0,
+                                             width[static_cast<std::size_t>(dy)]));
+                    slice ^= std::uint64_t{static_cast<std::uint8_t>(before ^ cells)} << (8 * dj);
+                }
+            }
+    });
+}
+
+// By slice.
+std::vector<std::uint64_t> voxels_in(const VoxelBox& box, std::span<Leaf* const> leaves) {
+    std::vector<std::uint64_t> voxels(static_cast<std::size_t>(box.nz), 0);
+    for (Leaf* leaf : leaves)
+        for (int k = 0; k < kLeaf && leaf->origin().x() + k < box.nz; ++k)
+            voxels[slot(leaf->origin().x() + k)] +=
+                static_cast<std::uint64_t>(std::popcount(slice_of(*leaf, k)));
+    return voxels;
+}
+
+// The sums of a slice's or a box's voxels. @param voxels, outside by slice, before and after free_of_swath()
+void sum_up(const VoxelBox& box, std::span<Leaf* const> leaves, std::span<const std::uint64_t> voxels,
+            std::span<const std::uint64_t> outside, RoughLeft& result) {
+    const double cell = box.voxel * box.voxel;
+    int worst = 0;
+    for (int k = 0; k < box.nz; ++k) {
+        const auto at = static_cast<std::size_t>(k);
+        result.voxels += voxels[at];
+        result.rough_area = std::max(result.rough_area, static_cast<double>(voxels[at]) * cell);
+        result.volume += static_cast<double>(outside[at]) * cell * box.voxel;
+        if (outside[at] > outside[static_cast<std::size_t>(worst)]) worst = k;
+    }
+    result.area = static_cast<double>(outside[static_cast<std::size_t>(worst)]) * cell;
+    std::pair first{INT32_MAX, INT32_MAX};
+    for (Leaf* leaf : leaves) {
+        const int dk = worst - leaf->origin().x();
+        if (dk < 0 || dk >= kLeaf || slice_of(*leaf, dk) == 0) continue;
+        const int bit = std::countr_zero(slice_of(*leaf, dk));
+        first = std::min(first, {leaf->origin().y() + bit / 8, leaf->origin().z() + bit % 8});
+    }
+    if (result.area > 0)
+        result.where = {box.min[0] + (first.second + 0.5) * box.voxel,
+                        box.min[1] + (first.first + 0.5) * box.voxel, box.z(worst)};
+}
+
+}  // namespace
+
 RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double swath) {
     // Of all levels at or under a slice the highest one clears most of it: what is kept grows downwards.
     std::vector<int> level(static_cast<std::size_t>(box_.nz), -1);  // by slice: the slice of its level's tip
@@ -360,116 +479,18 @@ RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double s
         }
         gone.emplace(at, std::move(rows));
     }
-
-    // Leaves of what is left: strips of eight rows and eight slices in parallel, put into the tree in their
-    // order.
-    struct Piece {
-        openvdb::Coord at;
-        std::unique_ptr<Leaf> leaf;
-    };
-    const int strips = (box_.ny + kLeaf - 1) / kLeaf, bands = (box_.nz + kLeaf - 1) / kLeaf,
-              columns = (box_.nx + kLeaf - 1) / kLeaf;
-    std::vector<std::vector<Piece>> pieces(static_cast<std::size_t>(strips) * bands);
-    parallel_for(context, pieces.size(), 16, [&](std::size_t begin, std::size_t end) {
-        std::vector<std::unique_ptr<Leaf>> open(static_cast<std::size_t>(columns));
-        std::vector<std::array<std::int32_t, 2>> both, rest;
-        for (std::size_t p = begin; p < end; ++p) {
-            const int j0 = static_cast<int>(p) % strips * kLeaf, k0 = static_cast<int>(p) / strips * kLeaf;
-            for (int k = k0; k < std::min(k0 + kLeaf, box_.nz); ++k)
-                for (int j = j0; j < std::min(j0 + kLeaf, box_.ny); ++j) {
-                    const auto row = slot(j + border_);
-                    const int at = level[static_cast<std::size_t>(k)];
-                    both.clear();
-                    rest.clear();
-                    append_union(kept_[static_cast<std::size_t>(k)].row(row),
-                                 at < 0 ? Spans{} : gone.at(at).row(row), both);
-                    append_rest(both, border_, border_ + box_.nx - 1, rest);
-                    for (const auto& s : rest)
-                        for (int c = (s[0] - border_) / kLeaf; c <= (s[1] - border_) / kLeaf; ++c) {
-                            std::unique_ptr<Leaf>& leaf = open[static_cast<std::size_t>(c)];
-                            if (!leaf) leaf = std::make_unique<Leaf>(openvdb::Coord(k0, j0, c * kLeaf));
-                            const std::array<std::int32_t, 2> run{s[0] - border_, s[1] - border_};
-                            slice_of(*leaf, k - k0) |=
-                                std::uint64_t{covered(std::span(&run, 1), c * kLeaf, 0)} << (8 * (j - j0));
-                        }
-                }
-            for (std::unique_ptr<Leaf>& leaf : open)
-                if (leaf) pieces[p].push_back({leaf->origin(), std::move(leaf)});
-        }
-    });
     MaskTree tree;
     std::vector<Leaf*> leaves;
-    for (auto& strip : pieces)
+    for (auto& strip : leaves_of(context, box_, border_, kept_, level, gone))
         for (Piece& piece : strip) {
             leaves.push_back(piece.leaf.get());
             tree.addLeaf(piece.leaf.release());
         }
-    pieces.clear();
-
     RoughLeft result;
-    std::vector<std::uint64_t> voxels(static_cast<std::size_t>(box_.nz), 0), outside(voxels);
-    for (Leaf* leaf : leaves)
-        for (int k = 0; k < kLeaf && leaf->origin().x() + k < box_.nz; ++k)
-            voxels[slot(leaf->origin().x() + k)] +=
-                static_cast<std::uint64_t>(std::popcount(slice_of(*leaf, k)));
+    const std::vector<std::uint64_t> voxels = voxels_in(box_, leaves);
     result.sparse_bytes = tree.memUsage();
-
-    const double reach = swath / box_.voxel + 0.5;
-    std::vector<int> width;
-    for (int dy = 0; half_width(reach, dy) >= 0; ++dy) width.push_back(half_width(reach, dy));
-    const int below = static_cast<int>(std::floor(swath / box_.voxel + 1e-6)), rows = box_.ny + 2 * border_;
-    parallel_for(context, leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t l = begin; l < end; ++l)
-            for (int dk = 0; dk < kLeaf; ++dk) {
-                std::uint64_t& slice = slice_of(*leaves[l], dk);
-                if (slice == 0) continue;
-                const auto [k, j0, i0] =
-                    std::array{leaves[l]->origin().x() + dk, leaves[l]->origin().y() + border_,
-                               leaves[l]->origin().z() + border_};
-                const CellRows &kept = kept_[static_cast<std::size_t>(k)],
-                               &under = kept_[static_cast<std::size_t>(std::max(0, k - below))];
-                for (int dj = 0; dj < kLeaf; ++dj) {
-                    auto cells = static_cast<std::uint8_t>(slice >> (8 * dj));
-                    if (cells == 0) continue;
-                    const std::uint8_t before = cells;
-                    const int j = j0 + dj;
-                    cells &=
-                        static_cast<std::uint8_t>(~covered(under.row(static_cast<std::size_t>(j)), i0, 0));
-                    for (int dy = 0; dy < static_cast<int>(width.size()) && cells != 0; ++dy)
-                        for (const int row : {j - dy, j + dy})
-                            if (row >= 0 && row < rows)
-                                cells &= static_cast<std::uint8_t>(
-                                    ~covered(kept.row(static_cast<std::size_t>(row)), i0,
-                                             width[static_cast<std::size_t>(dy)]));
-                    slice ^= std::uint64_t{static_cast<std::uint8_t>(before ^ cells)} << (8 * dj);
-                }
-            }
-    });
-    for (Leaf* leaf : leaves)
-        for (int k = 0; k < kLeaf && leaf->origin().x() + k < box_.nz; ++k)
-            outside[slot(leaf->origin().x() + k)] +=
-                static_cast<std::uint64_t>(std::popcount(slice_of(*leaf, k)));
-
-    const double cell = box_.voxel * box_.voxel;
-    int worst = 0;
-    for (int k = 0; k < box_.nz; ++k) {
-        const auto at = static_cast<std::size_t>(k);
-        result.voxels += voxels[at];
-        result.rough_area = std::max(result.rough_area, static_cast<double>(voxels[at]) * cell);
-        result.volume += static_cast<double>(outside[at]) * cell * box_.voxel;
-        if (outside[at] > outside[static_cast<std::size_t>(worst)]) worst = k;
-    }
-    result.area = static_cast<double>(outside[static_cast<std::size_t>(worst)]) * cell;
-    std::pair first{INT32_MAX, INT32_MAX};
-    for (Leaf* leaf : leaves) {
-        const int dk = worst - leaf->origin().x();
-        if (dk < 0 || dk >= kLeaf || slice_of(*leaf, dk) == 0) continue;
-        const int bit = std::countr_zero(slice_of(*leaf, dk));
-        first = std::min(first, {leaf->origin().y() + bit / 8, leaf->origin().z() + bit % 8});
-    }
-    if (result.area > 0)
-        result.where = {box_.min[0] + (first.second + 0.5) * box_.voxel,
-                        box_.min[1] + (first.first + 0.5) * box_.voxel, box_.z(worst)};
+    free_of_swath(context, box_, border_, kept_, swath, leaves);
+    sum_up(box_, leaves, voxels, voxels_in(box_, leaves), result);
     return result;
 }
 
