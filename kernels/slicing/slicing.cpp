@@ -338,6 +338,186 @@ void check(MeshView mesh, std::span<const Plane> planes, const SliceOptions& opt
         throw Error(ErrorKind::input, "slice.facets", "the mesh has more than 4294967294 facets");
 }
 
+// Many planes through one mesh.
+class Slicer {
+public:
+    Slicer(Context& context, MeshView mesh, std::span<const Plane> planes, const SliceOptions& options)
+        : context_(context),
+          mesh_(mesh),
+          options_(options),
+          facets_(mesh.facets.size()),
+          vertices_(mesh.vertices.size()),
+          order_(ascending(planes)),
+          grain_(std::max(kFacetGrain, (facets_ + kMaxChunks - 1) / kMaxChunks / 64 * 64 + 64)),
+          chunks_((facets_ + grain_ - 1) / grain_),
+          chunk_runs_(chunks_ + 1, 0) {
+        limits_.resize(planes.size());
+        for (std::size_t p = 0; p < order_.size(); ++p) limits_[p] = threshold(planes[order_[p]]);
+    }
+
+    void run(std::vector<Section>& sections) {
+        const MemoryCharge ranks_charge(context_, vertices_ * sizeof(std::uint32_t) + facets_ / 8, "slicing");
+        rank_vertices();
+        const std::uint64_t crossings = find_crossed();
+        const std::uint64_t listed =
+            std::min<std::uint64_t>(std::max<std::uint64_t>(kBatchCrossings, chunk_runs_.back()), crossings);
+        const MemoryCharge charge(context_, chunk_runs_.back() * sizeof(Run) + listed * sizeof(std::uint32_t),
+                                  "slicing");
+        list_runs();
+        for (std::size_t window = 0; window < order_.size(); window += kBatchPlanes)
+            cut_window(window, std::min(kBatchPlanes, order_.size() - window), sections);
+    }
+
+private:
+    static std::vector<std::uint32_t> ascending(std::span<const Plane> planes) {
+        std::vector<std::uint32_t> order(planes.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+            if (planes[a].z != planes[b].z) return planes[a].z < planes[b].z;
+            return planes[a].side != planes[b].side ? planes[a].side < planes[b].side : a < b;
+        });
+        return order;
+    }
+
+    // A vertex is above the first rank_[v] planes of the order, and below the others.
+    void rank_vertices() {
+        const Ranking ranking(limits_);
+        rank_.resize(vertices_);
+        parallel_for(context_, vertices_, kVertexGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t v = begin; v < end; ++v) {
+                const Vec3f& p = mesh_.vertices[v];
+                if (!(std::abs(p.x) <= kReach && std::abs(p.y) <= kReach && std::isfinite(p.z))) {
+                    throw Error(ErrorKind::input, "slice.range",
+                                "a vertex is not finite, or reaches past 214 m from the origin",
+                                "vertex " + std::to_string(v), "check the units of the model");
+                }
+                rank_[v] = ranking(p.z);
+            }
+        });
+    }
+    [[nodiscard]] Run run_of(std::size_t f) const {
+        const Index3& facet = mesh_.facets[f];
+        const auto [low, high] = std::minmax({rank_[facet[0]], rank_[facet[1]], rank_[facet[2]]});
+        return {static_cast<std::uint32_t>(f), low, high};
+    }
+
+    // Which facets are crossed, a bit for each. @returns how often by all planes together
+    std::uint64_t find_crossed() {
+        is_crossed_.assign((facets_ + 63) / 64, 0);
+        std::vector<std::uint64_t> chunk_crossings(chunks_, 0);
+        parallel_for(context_, facets_, grain_, [&](std::size_t begin, std::size_t end) {
+            std::uint64_t crossings = 0;
+            std::size_t count = 0;
+            for (std::size_t f = begin; f < end; ++f) {
+                const Index3& facet = mesh_.facets[f];
+                if (facet[0] >= vertices_ || facet[1] >= vertices_ || facet[2] >= vertices_) {
+                    throw Error(ErrorKind::input, "slice.index", "a facet names a vertex that does not exist",
+                                "facet " + std::to_string(f));
+                }
+                const Run run = run_of(f);
+                crossings += run.last - run.first;
+                count += run.first != run.last;
+                is_crossed_[f >> 6] |= std::uint64_t{run.first != run.last} << (f & 63);
+            }
+            chunk_crossings[begin / grain_] = crossings;
+            chunk_runs_[begin / grain_ + 1] = count;
+        });
+        std::partial_sum(chunk_runs_.begin(), chunk_runs_.end(), chunk_runs_.begin());
+        return std::accumulate(chunk_crossings.begin(), chunk_crossings.end(), std::uint64_t{0});
+    }
+
+    // The crossed facets with their planes; ranks are not needed after that.
+    void list_runs() {
+        runs_ = BulkVector<Run>(chunk_runs_.back());
+        parallel_for(context_, chunks_, 1, [&](std::size_t chunk, std::size_t) {
+            std::size_t at = chunk_runs_[chunk];
+            for (std::size_t word = chunk * grain_ / 64;
+                 word < std::min(is_crossed_.size(), (chunk + 1) * grain_ / 64); ++word)
+                for (std::uint64_t bits = is_crossed_[word]; bits != 0; bits &= bits - 1)
+                    runs_[at++] = run_of(64 * word + static_cast<std::size_t>(std::countr_zero(bits)));
+        });
+        rank_ = {};
+    }
+
+    static std::pair<std::size_t, std::size_t> clip(const Run& run, std::size_t first, std::size_t last) {
+        return {std::max<std::size_t>(run.first, first), std::min<std::size_t>(run.last, last)};
+    }
+
+    // Some planes, in batches of as many as have room in the list of crossings.
+    void cut_window(std::size_t window, std::size_t planes, std::vector<Section>& sections) {
+        // slots[chunk * stride + p]: first how many facets of the chunk plane window + p crosses, then where
+        // they go.
+        const std::size_t stride = planes + 1;
+        std::vector<std::uint64_t> slots(chunks_ * stride, 0);
+        parallel_for(context_, chunks_, 1, [&](std::size_t chunk, std::size_t) {
+            std::uint64_t* count = slots.data() + chunk * stride;
+            for (std::size_t i = chunk_runs_[chunk]; i < chunk_runs_[chunk + 1]; ++i) {
+                const auto [first, last] = clip(runs_[i], window, window + planes);
+                if (first >= last) continue;
+                ++count[first - window];
+                --count[last - window];  // wraps below zero, and back when summed
+            }
+            for (std::size_t p = 1; p < stride; ++p) count[p] += count[p - 1];
+        });
+        std::vector<std::uint64_t> totals(planes, 0);
+        for (std::size_t c = 0; c < chunks_; ++c)
+            for (std::size_t p = 0; p < planes; ++p) totals[p] += slots[c * stride + p];
+        for (std::size_t first = 0, last = 0; first < planes; first = last) {
+            std::uint64_t room = 0;
+            while (last < planes && (last == first || room + totals[last] <= kBatchCrossings))
+                room += totals[last++];
+            std::vector<std::uint64_t> starts(last - first + 1, 0);
+            for (std::size_t p = first; p < last; ++p) {
+                starts[p - first + 1] = starts[p - first] + totals[p];
+                std::uint64_t at = starts[p - first];
+                for (std::size_t c = 0; c < chunks_; ++c) at += std::exchange(slots[c * stride + p], at);
+            }
+            crossed_.resize(room);
+            parallel_for(context_, chunks_, 1, [&](std::size_t chunk, std::size_t) {
+                std::uint64_t* slot = slots.data() + chunk * stride;
+                for (std::size_t r = chunk_runs_[chunk]; r < chunk_runs_[chunk + 1]; ++r) {
+                    const auto [low, high] = clip(runs_[r], window + first, window + last);
+                    for (std::size_t p = low; p < high; ++p) crossed_[slot[p - window]++] = runs_[r].facet;
+                }
+            });
+            cut_planes(window + first, starts, sections);
+        }
+    }
+    // @param starts of the crossings of the planes from `first` on
+    void cut_planes(std::size_t first, std::span<const std::uint64_t> starts,
+                    std::vector<Section>& sections) {
+        const auto clean = [this] {
+            auto scratch = std::make_unique<Scratch>();
+            scratch->pending.assign((facets_ + 63) / 64, 0);
+            return scratch;
+        };
+        parallel_for(context_, starts.size() - 1, kPlaneGrain, [&](std::size_t begin, std::size_t end) {
+            auto scratch = pool_.take(clean);
+            for (std::size_t i = begin; i < end; ++i) {
+                context_.throw_if_cancelled();
+                cut(mesh_, limits_[first + i],
+                    std::span<const std::uint32_t>(crossed_).subspan(starts[i], starts[i + 1] - starts[i]),
+                    options_, *scratch, sections[order_[first + i]]);
+            }
+            pool_.give(std::move(scratch));
+        });
+    }
+
+    Context& context_;
+    const MeshView mesh_;
+    const SliceOptions& options_;
+    const std::size_t facets_, vertices_;
+    const std::vector<std::uint32_t> order_;  // of the planes, ascending
+    std::vector<float> limits_;               // in that order
+    BulkVector<std::uint32_t> rank_;
+    const std::size_t grain_, chunks_;  // of facets
+    std::vector<std::uint64_t> is_crossed_;
+    std::vector<std::size_t> chunk_runs_;
+    BulkVector<Run> runs_;
+    BulkVector<std::uint32_t> crossed_;
+    ScratchPool<Scratch> pool_;  // clean ones
+};
+
 }  // namespace
 
 std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plane> planes,
@@ -345,140 +525,7 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
     check(mesh, planes, options);
     std::vector<Section> sections(planes.size());
     for (std::size_t i = 0; i < planes.size(); ++i) sections[i].plane = planes[i];
-    if (planes.empty() || mesh.facets.empty()) return sections;
-    const std::size_t facets = mesh.facets.size(), vertices = mesh.vertices.size();
-    const MemoryCharge ranks_charge(context, vertices * sizeof(std::uint32_t) + facets / 8, "slicing");
-
-    std::vector<std::uint32_t> order(planes.size());
-    std::iota(order.begin(), order.end(), 0u);
-    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-        if (planes[a].z != planes[b].z) return planes[a].z < planes[b].z;
-        return planes[a].side != planes[b].side ? planes[a].side < planes[b].side : a < b;
-    });
-    std::vector<float> limits(planes.size());
-    for (std::size_t p = 0; p < order.size(); ++p) limits[p] = threshold(planes[order[p]]);
-
-    // A vertex is above the first rank[v] planes of the order, and below the others.
-    const Ranking ranking(limits);
-    BulkVector<std::uint32_t> rank(vertices);
-    parallel_for(context, vertices, kVertexGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v) {
-            const Vec3f& p = mesh.vertices[v];
-            if (!(std::abs(p.x) <= kReach && std::abs(p.y) <= kReach && std::isfinite(p.z))) {
-                throw Error(ErrorKind::input, "slice.range",
-                            "a vertex is not finite, or reaches past 214 m from the origin",
-                            "vertex " + std::to_string(v), "check the units of the model");
-            }
-            rank[v] = ranking(p.z);
-        }
-    });
-    // First which facets are crossed, and by how many planes in all, a bit for each facet; then their runs,
-    // in a list just as long.
-    const std::size_t grain = std::max(kFacetGrain, (facets + kMaxChunks - 1) / kMaxChunks / 64 * 64 + 64),
-                      chunks = (facets + grain - 1) / grain;
-    std::vector<std::uint64_t> is_crossed((facets + 63) / 64, 0);
-    std::vector<std::uint64_t> chunk_crossings(chunks, 0);
-    std::vector<std::size_t> chunk_runs(chunks + 1, 0);
-    auto run_of = [&](std::size_t f) {
-        const Index3& facet = mesh.facets[f];
-        const auto [low, high] = std::minmax({rank[facet[0]], rank[facet[1]], rank[facet[2]]});
-        return Run{static_cast<std::uint32_t>(f), low, high};
-    };
-    parallel_for(context, facets, grain, [&](std::size_t begin, std::size_t end) {
-        std::uint64_t crossings = 0;
-        std::size_t count = 0;
-        for (std::size_t f = begin; f < end; ++f) {
-            const Index3& facet = mesh.facets[f];
-            if (facet[0] >= vertices || facet[1] >= vertices || facet[2] >= vertices) {
-                throw Error(ErrorKind::input, "slice.index", "a facet names a vertex that does not exist",
-                            "facet " + std::to_string(f));
-            }
-            const Run run = run_of(f);
-            crossings += run.last - run.first;
-            count += run.first != run.last;
-            is_crossed[f >> 6] |= std::uint64_t{run.first != run.last} << (f & 63);
-        }
-        chunk_crossings[begin / grain] = crossings;
-        chunk_runs[begin / grain + 1] = count;
-    });
-    std::partial_sum(chunk_runs.begin(), chunk_runs.end(), chunk_runs.begin());
-    const std::uint64_t crossings =
-        std::accumulate(chunk_crossings.begin(), chunk_crossings.end(), std::uint64_t{0});
-    const std::uint64_t listed =
-        std::min<std::uint64_t>(std::max<std::uint64_t>(kBatchCrossings, chunk_runs.back()), crossings);
-    const MemoryCharge charge(context, chunk_runs.back() * sizeof(Run) + listed * sizeof(std::uint32_t),
-                              "slicing");
-    BulkVector<Run> runs(chunk_runs.back());
-    parallel_for(context, chunks, 1, [&](std::size_t chunk, std::size_t) {
-        std::size_t at = chunk_runs[chunk];
-        for (std::size_t word = chunk * grain / 64;
-             word < std::min(is_crossed.size(), (chunk + 1) * grain / 64); ++word)
-            for (std::uint64_t bits = is_crossed[word]; bits != 0; bits &= bits - 1)
-                runs[at++] = run_of(64 * word + static_cast<std::size_t>(std::countr_zero(bits)));
-    });
-    rank = {};
-
-    ScratchPool<Scratch> pool;  // clean ones
-    const auto clean = [facets] {
-        auto scratch = std::make_unique<Scratch>();
-        scratch->pending.assign((facets + 63) / 64, 0);
-        return scratch;
-    };
-    BulkVector<std::uint32_t> crossed;
-    for (std::size_t window = 0; window < order.size(); window += kBatchPlanes) {
-        const std::size_t window_planes = std::min(kBatchPlanes, order.size() - window);
-        // slots[chunk * stride + p]: first how many facets of the chunk plane window + p crosses, then where
-        // they go.
-        const std::size_t stride = window_planes + 1;
-        std::vector<std::uint64_t> slots(chunks * stride, 0);
-        auto clip = [&](const Run& run, std::size_t first, std::size_t last) {
-            return std::pair(std::max<std::size_t>(run.first, first), std::min<std::size_t>(run.last, last));
-        };
-        parallel_for(context, chunks, 1, [&](std::size_t chunk, std::size_t) {
-            std::uint64_t* count = slots.data() + chunk * stride;
-            for (std::size_t i = chunk_runs[chunk]; i < chunk_runs[chunk + 1]; ++i) {
-                const auto [first, last] = clip(runs[i], window, window + window_planes);
-                if (first >= last) continue;
-                ++count[first - window];
-                --count[last - window];  // wraps below zero, and back when summed
-            }
-            for (std::size_t p = 1; p < stride; ++p) count[p] += count[p - 1];
-        });
-        std::vector<std::uint64_t> totals(window_planes, 0);
-        for (std::size_t c = 0; c < chunks; ++c)
-            for (std::size_t p = 0; p < window_planes; ++p) totals[p] += slots[c * stride + p];
-
-        for (std::size_t first = 0, last = 0; first < window_planes; first = last) {
-            std::uint64_t room = 0;
-            while (last < window_planes && (last == first || room + totals[last] <= kBatchCrossings))
-                room += totals[last++];
-            std::vector<std::uint64_t> starts(last - first + 1, 0);
-            for (std::size_t p = first; p < last; ++p) {
-                starts[p - first + 1] = starts[p - first] + totals[p];
-                std::uint64_t at = starts[p - first];
-                for (std::size_t c = 0; c < chunks; ++c) at += std::exchange(slots[c * stride + p], at);
-            }
-            crossed.resize(room);
-            parallel_for(context, chunks, 1, [&](std::size_t chunk, std::size_t) {
-                std::uint64_t* slot = slots.data() + chunk * stride;
-                for (std::size_t r = chunk_runs[chunk]; r < chunk_runs[chunk + 1]; ++r) {
-                    const auto [low, high] = clip(runs[r], window + first, window + last);
-                    for (std::size_t p = low; p < high; ++p) crossed[slot[p - window]++] = runs[r].facet;
-                }
-            });
-            parallel_for(context, last - first, kPlaneGrain, [&](std::size_t begin, std::size_t end) {
-                auto scratch = pool.take(clean);
-                for (std::size_t i = begin; i < end; ++i) {
-                    context.throw_if_cancelled();
-                    const std::size_t p = window + first + i;
-                    cut(mesh, limits[p],
-                        std::span<const std::uint32_t>(crossed).subspan(starts[i], starts[i + 1] - starts[i]),
-                        options, *scratch, sections[order[p]]);
-                }
-                pool.give(std::move(scratch));
-            });
-        }
-    }
+    if (!planes.empty() && !mesh.facets.empty()) Slicer(context, mesh, planes, options).run(sections);
     return sections;
 }
 
