@@ -117,115 +117,148 @@ FibreGrid fibre_grid(const LayerSolid& solid, const Cutter& cutter, std::int32_t
 namespace {
 
 // The border between what is forbidden along the fibres and what is free.
-Contours linked(const Fibres& along_x, const Fibres& along_y, const FibreGrid& grid, double tip_z) {
-    Contours contours;
-    const std::size_t columns = grid.x.size(), rows = grid.y.size();
-    std::vector<std::vector<NodeRange>> node_rows(rows);
-    for (std::size_t j = 0; j < rows; ++j) node_rows[j] = forbidden_nodes(along_x.line(j), grid.x);
+// Links the crossings of a border with the grid's lines.
+class Linker {
+public:
+    Linker(const Fibres& along_x, const Fibres& along_y, const FibreGrid& grid, double tip_z)
+        : along_x_(along_x),
+          along_y_(along_y),
+          grid_(grid),
+          tip_z_(tip_z),
+          columns_(grid.x.size()),
+          rows_(grid.y.size()),
+          node_rows_(rows_) {
+        for (std::size_t j = 0; j < rows_; ++j) node_rows_[j] = forbidden_nodes(along_x.line(j), grid.x);
+    }
 
+    Contours run() {
+        check_closed();
+        cross_rows();
+        cross_columns();
+        for (std::size_t j = 0; j < rows_; ++j)
+            for (std::uint32_t k = on_rows_.starts[j]; k < on_rows_.starts[j + 1]; ++k)
+                if (!on_rows_.crossings[k].visited) trace(true, j, &on_rows_.crossings[k]);
+        for (std::size_t i = 0; i < columns_; ++i)
+            for (std::uint32_t k = on_columns_.starts[i]; k < on_columns_.starts[i + 1]; ++k)
+                if (!on_columns_.crossings[k].visited) trace(false, i, &on_columns_.crossings[k]);
+        return std::move(contours_);
+    }
+
+private:
     // The border is followed from cell to cell, so it has to close within the grid.
-    for (std::size_t j = 0; j < rows; ++j) {
-        const std::vector<NodeRange>& r = node_rows[j];
-        if (!r.empty() && (j == 0 || j + 1 == rows || r.front().first == 0 || r.back().last == columns))
-            throw Error(ErrorKind::no_plan, "contours.open",
-                        "what a cutter must keep out of reaches past the layer's facets",
-                        "y " + std::to_string(grid.y[j] / 10000) + " mm, tip " +
-                            std::to_string(static_cast<long>(tip_z)) + " mm",
-                        "check the mesh with slabwright inspect, and report this");
+    void check_closed() const {
+        for (std::size_t j = 0; j < rows_; ++j) {
+            const std::vector<NodeRange>& r = node_rows_[j];
+            if (!r.empty() && (j == 0 || j + 1 == rows_ || r.front().first == 0 || r.back().last == columns_))
+                throw Error(ErrorKind::no_plan, "contours.open",
+                            "what a cutter must keep out of reaches past the layer's facets",
+                            "y " + std::to_string(grid_.y[j] / 10000) + " mm, tip " +
+                                std::to_string(static_cast<long>(tip_z_)) + " mm",
+                            "check the mesh with slabwright inspect, and report this");
+        }
     }
 
-    Lines on_rows, on_columns;
-    for (std::size_t j = 0; j < rows; ++j) {
-        for (const NodeRange& r : node_rows[j]) {
-            auto add = [&](std::uint32_t cell, bool low_is_solid) {
-                EdgeCrossing c =
-                    crossing_between(along_x.line(j), grid.x[cell], grid.x[cell + 1], low_is_solid);
-                c.cell = cell;
-                on_rows.crossings.push_back(c);
-            };
-            if (r.first > 0) add(r.first - 1, false);
-            if (r.last < columns) add(r.last - 1, true);
+    void cross_rows() {
+        for (std::size_t j = 0; j < rows_; ++j) {
+            for (const NodeRange& r : node_rows_[j]) {
+                auto add = [&](std::uint32_t cell, bool low_is_solid) {
+                    EdgeCrossing c =
+                        crossing_between(along_x_.line(j), grid_.x[cell], grid_.x[cell + 1], low_is_solid);
+                    c.cell = cell;
+                    on_rows_.crossings.push_back(c);
+                };
+                if (r.first > 0) add(r.first - 1, false);
+                if (r.last < columns_) add(r.last - 1, true);
+            }
+            on_rows_.starts.push_back(static_cast<std::uint32_t>(on_rows_.crossings.size()));
         }
-        on_rows.starts.push_back(static_cast<std::uint32_t>(on_rows.crossings.size()));
     }
+
     // Between two rows the border crosses every column whose node is in one row's ranges but not in the
     // other's.
-    std::vector<std::vector<std::uint32_t>> cells_of_column(columns);
-    for (std::size_t j = 0; j + 1 < rows; ++j) {
-        const auto &a = node_rows[j], &b = node_rows[j + 1];
-        std::vector<std::uint32_t> cuts;
-        for (const NodeRange& r : a) cuts.insert(cuts.end(), {r.first, r.last});
-        for (const NodeRange& r : b) cuts.insert(cuts.end(), {r.first, r.last});
-        std::sort(cuts.begin(), cuts.end());
-        for (std::size_t k = 0; k + 1 < cuts.size(); ++k)
-            if (cuts[k] != cuts[k + 1] && contains(a, cuts[k]) != contains(b, cuts[k]))
-                for (std::uint32_t i = cuts[k]; i < cuts[k + 1]; ++i)
-                    cells_of_column[i].push_back(static_cast<std::uint32_t>(j));
-    }
-    for (std::size_t i = 0; i < columns; ++i) {
-        for (const std::uint32_t j : cells_of_column[i]) {
-            const bool low_is_solid = contains(node_rows[j], static_cast<std::uint32_t>(i));
-            EdgeCrossing c = crossing_between(along_y.line(i), grid.y[j], grid.y[j + 1], low_is_solid);
-            c.cell = j;
-            on_columns.crossings.push_back(c);
+    void cross_columns() {
+        std::vector<std::vector<std::uint32_t>> cells_of_column(columns_);
+        for (std::size_t j = 0; j + 1 < rows_; ++j) {
+            const auto &a = node_rows_[j], &b = node_rows_[j + 1];
+            std::vector<std::uint32_t> cuts;
+            for (const NodeRange& r : a) cuts.insert(cuts.end(), {r.first, r.last});
+            for (const NodeRange& r : b) cuts.insert(cuts.end(), {r.first, r.last});
+            std::sort(cuts.begin(), cuts.end());
+            for (std::size_t k = 0; k + 1 < cuts.size(); ++k)
+                if (cuts[k] != cuts[k + 1] && contains(a, cuts[k]) != contains(b, cuts[k]))
+                    for (std::uint32_t i = cuts[k]; i < cuts[k + 1]; ++i)
+                        cells_of_column[i].push_back(static_cast<std::uint32_t>(j));
         }
-        on_columns.starts.push_back(static_cast<std::uint32_t>(on_columns.crossings.size()));
+        for (std::size_t i = 0; i < columns_; ++i) {
+            for (const std::uint32_t j : cells_of_column[i]) {
+                const bool low_is_solid = contains(node_rows_[j], static_cast<std::uint32_t>(i));
+                EdgeCrossing c = crossing_between(along_y_.line(i), grid_.y[j], grid_.y[j + 1], low_is_solid);
+                c.cell = j;
+                on_columns_.crossings.push_back(c);
+            }
+            on_columns_.starts.push_back(static_cast<std::uint32_t>(on_columns_.crossings.size()));
+        }
     }
 
-    // Follow the border with the solid on the right. In a cell, the exit is the edge next to the entry around
-    // the free corner that both share, so that in a doubtful cell (solid corners on one diagonal) the solid
-    // stays connected.
-    auto trace = [&](bool start_on_row, std::size_t line, EdgeCrossing* start) {
-        bool on_row = start_on_row;
+    // Follows the border with the solid on the right.
+    void trace(bool on_row, std::size_t line, EdgeCrossing* start) {
         EdgeCrossing* c = start;
         while (!c->visited) {
             c->visited = true;
-            const std::int32_t fixed = on_row ? grid.y[line] : grid.x[line];
-            contours.points.push_back(on_row ? Point2{c->at, fixed} : Point2{fixed, c->at});
-            contours.nz.push_back(c->nz);
-            // The cell (i, j) ahead, and the free corner beside this crossing.
-            std::uint32_t i, j;
-            bool free_is_east, free_is_north;
-            if (on_row) {  // solid in the west: heading south; in the east: north
-                i = c->cell;
-                j = static_cast<std::uint32_t>(line);
-                free_is_east = c->low_is_solid;
-                free_is_north = c->low_is_solid;  // heading south, the row is the next cell's northern edge
-                if (c->low_is_solid) --j;
-            } else {  // solid in the south: heading east; in the north: west
-                i = static_cast<std::uint32_t>(line);
-                j = c->cell;
-                free_is_north = c->low_is_solid;
-                free_is_east = !c->low_is_solid;  // heading east, the column is the next cell's western edge
-                if (!c->low_is_solid) --i;
-            }
-            // Turning around the free corner first (a left turn), then straight on, then around the solid
-            // corner.
-            const std::uint32_t near_row = free_is_north ? j + 1 : j, far_row = free_is_north ? j : j + 1;
-            const std::uint32_t near_column = free_is_east ? i + 1 : i, far_column = free_is_east ? i : i + 1;
-            EdgeCrossing* next = nullptr;
-            if (on_row) {
-                if ((next = on_columns.find(near_column, j))) on_row = false, line = near_column;
-                else if ((next = on_rows.find(far_row, i))) line = far_row;
-                else if ((next = on_columns.find(far_column, j))) on_row = false, line = far_column;
-            } else {
-                if ((next = on_rows.find(near_row, i))) on_row = true, line = near_row;
-                else if ((next = on_columns.find(far_column, j))) line = far_column;
-                else if ((next = on_rows.find(far_row, i))) on_row = true, line = far_row;
-            }
-            if (!next) break;  // cannot happen on a grid that encloses the solid
+            const std::int32_t fixed = on_row ? grid_.y[line] : grid_.x[line];
+            contours_.points.push_back(on_row ? Point2{c->at, fixed} : Point2{fixed, c->at});
+            contours_.nz.push_back(c->nz);
+            EdgeCrossing* next = next_of(*c, on_row, line);
+            if (!next) break;  // cannot happen on a grid_ that encloses the solid
             c = next;
         }
-        contours.starts.push_back(static_cast<std::uint32_t>(contours.points.size()));
-    };
-    for (std::size_t j = 0; j < rows; ++j)
-        for (std::uint32_t k = on_rows.starts[j]; k < on_rows.starts[j + 1]; ++k)
-            if (!on_rows.crossings[k].visited) trace(true, j, &on_rows.crossings[k]);
-    for (std::size_t i = 0; i < columns; ++i)
-        for (std::uint32_t k = on_columns.starts[i]; k < on_columns.starts[i + 1]; ++k)
-            if (!on_columns.crossings[k].visited) trace(false, i, &on_columns.crossings[k]);
-    return contours;
-}
+        contours_.starts.push_back(static_cast<std::uint32_t>(contours_.points.size()));
+    }
+
+    // In a cell, the exit is the edge next to the entry around the free corner that both share, so that in a
+    // doubtful cell (solid corners on one diagonal) the solid stays connected. Moves on `on_row` and `line`.
+    EdgeCrossing* next_of(const EdgeCrossing& c, bool& on_row, std::size_t& line) {
+        // The cell (i, j) ahead, and the free corner beside this crossing.
+        std::uint32_t i, j;
+        bool free_is_east, free_is_north;
+        if (on_row) {  // solid in the west: heading south; in the east: north
+            i = c.cell;
+            j = static_cast<std::uint32_t>(line);
+            free_is_east = c.low_is_solid;
+            free_is_north = c.low_is_solid;  // heading south, the row is the next cell's northern edge
+            if (c.low_is_solid) --j;
+        } else {  // solid in the south: heading east; in the north: west
+            i = static_cast<std::uint32_t>(line);
+            j = c.cell;
+            free_is_north = c.low_is_solid;
+            free_is_east = !c.low_is_solid;  // heading east, the column is the next cell's western edge
+            if (!c.low_is_solid) --i;
+        }
+        // Turning around the free corner first (a left turn), then straight on, then around the solid
+        // corner.
+        const std::uint32_t near_row = free_is_north ? j + 1 : j, far_row = free_is_north ? j : j + 1;
+        const std::uint32_t near_column = free_is_east ? i + 1 : i, far_column = free_is_east ? i : i + 1;
+        EdgeCrossing* next = nullptr;
+        if (on_row) {
+            if ((next = on_columns_.find(near_column, j))) on_row = false, line = near_column;
+            else if ((next = on_rows_.find(far_row, i))) line = far_row;
+            else if ((next = on_columns_.find(far_column, j))) on_row = false, line = far_column;
+        } else {
+            if ((next = on_rows_.find(near_row, i))) on_row = true, line = near_row;
+            else if ((next = on_columns_.find(far_column, j))) line = far_column;
+            else if ((next = on_rows_.find(far_row, i))) on_row = true, line = far_row;
+        }
+        return next;
+    }
+
+    const Fibres &along_x_, &along_y_;
+    const FibreGrid& grid_;
+    const double tip_z_;
+    const std::size_t columns_, rows_;
+    std::vector<std::vector<NodeRange>> node_rows_;
+    Lines on_rows_, on_columns_;
+    Contours contours_;
+};
 
 }  // namespace
 
@@ -237,7 +270,7 @@ std::vector<Contours> level_contours(Context& context, const LayerSolid& solid,
     std::vector<Fibres> along_x = fibres(context, solid, levels, cutter, Axis::x, grid.y),
                         along_y = fibres(context, solid, levels, cutter, Axis::y, grid.x);
     parallel_each(context, levels.size(), [&](std::size_t i) {
-        contours[i] = linked(along_x[i], along_y[i], grid, levels[i].tip_z);
+        contours[i] = Linker(along_x[i], along_y[i], grid, levels[i].tip_z).run();
         along_x[i] = along_y[i] = {};
     });
     return contours;
