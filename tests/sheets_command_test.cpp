@@ -193,7 +193,7 @@ TEST(SheetsCommand, CorpusPartsPassTheirProofAndOthersReadTheirProgramsAndDrawin
 }
 
 TEST(SheetsCommand, EzdxfReadsEveryDrawingWithoutAFinding) {
-    if (!has_ezdxf()) GTEST_SKIP() << "python3-ezdxf is not installed; tools/setup does that";
+    if (!has_ezdxf()) GTEST_SKIP() << "python3-ezdxf is not installed; tools/setup tests does that";
     const TemporaryFolder folder;
     const std::string out = folder / "out";
     ASSERT_EQ(sheets(out, {"--stock", "600", "600", "--head", "jet", "--thickness", "6", "12", "--align",

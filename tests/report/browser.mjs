@@ -16,7 +16,7 @@ export async function browser(source) {
     } catch {
         return {missing: 'io/report/node_modules is missing: run tools/setup'};
     }
-    if (!existsSync(chromiumPath)) return {missing: `${chromiumPath} is missing: run tools/setup`};
+    if (!existsSync(chromiumPath)) return {missing: `${chromiumPath} is missing: run tools/setup tests`};
     const started = await chromium.launch({
         executablePath: chromiumPath,
         args: ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync',
