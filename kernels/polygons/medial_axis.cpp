@@ -8,8 +8,10 @@
 #include <cstddef>
 #include <numbers>
 #include <tuple>
+#include <utility>
 
 #include "kernels/geometry/vectors.h"
+#include "kernels/polygons/farthest.h"
 #include "kernels/polygons/plane_edges.h"
 
 namespace slabwright {
@@ -21,12 +23,68 @@ using Cell = Diagram::cell_type;
 using Vertex = Diagram::vertex_type;
 
 constexpr double kLeastClearance = 10;  // units: nearer than that a point is a wall's own corner
+constexpr double kStraight = 3;         // units, within which corners lie in a line
 constexpr double kAngle = 1e-6;         // rad, of rounding
 constexpr std::uint32_t kNone = UINT32_MAX;
 
 Vec2d of(Point2 p) { return {double(p.x), double(p.y)}; }
 Vec2d at_share(const Vec2d& a, const Vec2d& b, double t) {
     return {a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)};
+}
+
+/// The points of a stretch of a loop between two that stay, without those that lie in their neighbours' line.
+void thin_between(const PointRows& rows, std::size_t first, std::size_t last, std::vector<char>& stays) {
+    std::vector<std::pair<std::size_t, std::size_t>> open{{first, last}};
+    while (!open.empty()) {
+        const auto [from, to] = open.back();
+        open.pop_back();
+        const Farthest farthest = farthest_between(rows, from, to);
+        if (farthest.distance2 <= kStraight * kStraight) continue;
+        stays[farthest.at] = 1;
+        open.emplace_back(from, farthest.at);
+        open.emplace_back(farthest.at, to);
+    }
+}
+
+/// Walls that many facets make up are straight but for rounding. Without that the diagram has to decide in
+/// exact numbers, again and again, which of two points on one line is nearer.
+Loops without_straight_corners(const Loops& loops) {
+    Loops thinned;
+    PointRows rows;
+    std::vector<char> stays;
+    for (std::size_t l = 0; l < loops.size(); ++l) {
+        const auto loop = loops.loop(l);
+        const std::size_t n = loop.size();
+        if (n < 3) continue;
+        rows.x.clear(), rows.y.clear();
+        for (std::size_t i = 0; i <= n; ++i) {
+            rows.x.push_back(loop[i % n].x);
+            rows.y.push_back(loop[i % n].y);
+        }
+        rows.z.assign(n + 1, 0.0);
+        // The lowest corner and the one farthest from it are certain to be corners.
+        std::size_t begin = 0, far = 0;
+        for (std::size_t i = 1; i < n; ++i)
+            if (loop[i] < loop[begin]) begin = i;
+        std::rotate(rows.x.begin(), rows.x.begin() + static_cast<std::ptrdiff_t>(begin), rows.x.end() - 1);
+        std::rotate(rows.y.begin(), rows.y.begin() + static_cast<std::ptrdiff_t>(begin), rows.y.end() - 1);
+        rows.x.back() = rows.x.front(), rows.y.back() = rows.y.front();
+        double most = -1;
+        for (std::size_t i = 1; i < n; ++i) {
+            const double d = std::hypot(rows.x[i] - rows.x[0], rows.y[i] - rows.y[0]);
+            if (d > most) most = d, far = i;
+        }
+        stays.assign(n + 1, 0);
+        stays[0] = stays[far] = 1;
+        thin_between(rows, 0, far, stays);
+        thin_between(rows, far, n, stays);
+        for (std::size_t i = 0; i < n; ++i)
+            if (stays[i])
+                thinned.points.push_back(
+                    {static_cast<std::int32_t>(rows.x[i]), static_cast<std::int32_t>(rows.y[i])});
+        thinned.close_loop();
+    }
+    return thinned;
 }
 
 /// What is nearest to the points of a Voronoi cell: a wall's edge, or the end of one.
@@ -74,6 +132,29 @@ public:
     /// Where it is nearest to both sources, if that lies between its ends.
     [[nodiscard]] double pinch() const { return pinch_; }
 
+    /// The shares of it beyond which it is wider than `most`, or out of a box; first > last: all of it.
+    [[nodiscard]] std::pair<double, double> range(double most, const Vec2d& low, const Vec2d& high) const {
+        if (curved_) {
+            const double h = std::abs(height_), off2 = 2 * h * most - h * h;
+            const double reach = off2 > 0 ? std::sqrt(off2) / std::abs(u1_ - u0_) : -1;
+            return {std::max(0.0, pinch_ - reach), std::min(1.0, pinch_ + reach)};
+        }
+        // Straight: as far as it passes the box.
+        double first = 0, last = 1;
+        const auto within = [&](double from, double to, double least, double greatest) {
+            if (from == to) {
+                if (from < least || from > greatest) last = -1;
+                return;
+            }
+            const double a = (least - from) / (to - from), b = (greatest - from) / (to - from);
+            first = std::max(first, std::min(a, b));
+            last = std::min(last, std::max(a, b));
+        };
+        within(from_.x, to_.x, low.x, high.x);
+        within(from_.y, to_.y, low.y, high.y);
+        return {first, last};
+    }
+
 private:
     static double share(const Vec2d& p, const Vec2d& from, const Vec2d& to) {
         const Vec2d d = to - from;
@@ -88,8 +169,12 @@ private:
 class NarrowAxis {
 public:
     NarrowAxis(const Loops& solid, const MedialLimits& limits)
-        : solid_(solid), limits_(limits), edges_(edges_meeting_in_ends(solid)) {
+        : solid_(solid), limits_(limits), edges_(edges_meeting_in_ends(without_straight_corners(solid))) {
         for (std::uint32_t i = 0; i < edges_.size(); ++i) by_end_.push_back(i);
+        for (const Point2 p : solid.points) {
+            low_ = {std::min(low_.x, double(p.x)), std::min(low_.y, double(p.y))};
+            high_ = {std::max(high_.x, double(p.x)), std::max(high_.y, double(p.y))};
+        }
         std::sort(by_end_.begin(), by_end_.end(), [&](std::uint32_t i, std::uint32_t j) {
             return edges_[i].b != edges_[j].b ? edges_[i].b < edges_[j].b : i < j;
         });
@@ -180,8 +265,12 @@ private:
         if (here > most && there > most && !pinched) return;
         std::vector<double>& shares = shares_;
         shares.assign({0.0, 1.0});
-        const auto pieces = static_cast<int>(std::ceil(far / (limits_.step_mm * kUnitsPerMm)));
-        for (int i = 1; i < pieces; ++i) shares.push_back(double(i) / pieces);
+        const auto [first, last] = bisector.range(most, low_, high_);
+        if (first > last && !pinched) return;
+        const double pieces = std::ceil(far * (last - first) / (limits_.step_mm * kUnitsPerMm));
+        if (first > 0) shares.push_back(first);
+        for (double i = 1; i < pieces; ++i) shares.push_back(first + (last - first) * i / pieces);
+        if (last < 1) shares.push_back(last);
         if (pinched) shares.push_back(pinch);
         std::sort(shares.begin(), shares.end());
         Sample before;
@@ -262,6 +351,7 @@ private:
     MedialAxis axis_;
     std::vector<std::uint32_t> points_of_;  // of each vertex of the diagram, its point
     std::vector<double> shares_;            // scratch
+    Vec2d low_{kUnbounded, kUnbounded}, high_{-kUnbounded, -kUnbounded};  // of the solid
 };
 
 }  // namespace

@@ -34,7 +34,7 @@ struct MedialLimits {
 
 /// Of the plane outside `solid`, between its loops and beside them, the medial axis where it is narrow: where
 /// walls face each other within the limits, and the middles of what is round (the nearest places of the walls
-/// lie all around them). Clearances at ends, branches and pinches are exact to the 0.1 µm of the loops; where
+/// lie all around them). Clearances at ends, branches and pinches are exact to 0.4 µm; where
 /// a limit cuts the axis off, it ends within a step of there. By the Voronoi diagram of the loops' edges
 /// (Boost.Polygon), O(n log n).
 /// @param solid as simplify() gives it; edges that cross or touch in spite of that are divided there
