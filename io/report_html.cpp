@@ -26,6 +26,7 @@
 #include "io/write/draw_json.h"
 #include "io/write/output_file.h"
 #include "io/write/report_as_built.h"
+#include "io/write/report_cavities.h"
 #include "io/write/report_draw.h"
 #include "io/write/report_outlines.h"
 #include "io/write/report_reach.h"
@@ -507,6 +508,11 @@ std::string report_html(Context& context, const std::string& directory, const Re
     figures.data = {
         {"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", plan}, {"verify", verify}};
     check_draw_of(context, mesh, figures);
+    Job job = folder.build.job;
+    job.tools = folder.simulation.tools;
+    std::vector<double> tops;
+    for (const SimulatedLayer& layer : folder.simulation.layers) tops.push_back(layer.z_top);
+    figures.data["cavities"] = Json::parse(report_cavities(context, mesh, job, tops));
     const auto draw = [&] {
         Json& steps = figures.data["steps"] = Json::array();
         if (sequence.is_object())
