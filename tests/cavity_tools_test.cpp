@@ -3,11 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/catalogue.h"
+#include "engine/planner/planner.h"
 #include "engine/tools/libraries.h"
 #include "kernels/forces/deflection.h"
+#include "kernels/mesh/weld.h"
+#include "tests/support/drilled_plate.h"
 
 namespace slabwright {
 namespace {
@@ -102,6 +106,17 @@ TEST(CavityTools, TooDeepForAnyToolAsksForABoundary) {
     EXPECT_NEAR(*thin.boundary_mm, 5 + 24 - job.cutting.holder_clearance, 1e-9);
 }
 
+TEST(CavityTools, AToolThatCanBeHadGoesBeforeABoundary) {
+    const Job job;
+    NarrowCavity cavity = slot(2.5, 40, 2, 19.5, {19.5});  // 100 mm², and a tip that only 1.5 mm enters
+    for (CavityLevel& level : cavity.levels) level.widths.insert(level.widths.begin(), {1.5, 30});
+    const CavityAdvice found = advice(job, cavity);
+    ASSERT_TRUE(found.missing);
+    EXPECT_DOUBLE_EQ(found.missing->diameter_mm, 2.5) << "1.5 mm tools have 18 mm of flutes at most";
+    EXPECT_NEAR(found.missing->left_mm2, 30, 1e-9);
+    EXPECT_FALSE(found.boundary_mm);
+}
+
 TEST(CavityTools, TheDeepestLayerDecides) {
     Job job;
     job.tools = *named_library("metric");
@@ -110,6 +125,48 @@ TEST(CavityTools, TheDeepestLayerDecides) {
     EXPECT_DOUBLE_EQ(found.reach_mm, 18);
     EXPECT_TRUE(found.tool);
     EXPECT_FALSE(found.boundary_mm);
+}
+
+// What is told of a slot is what a plan does: the tool that is told cuts it, and nothing as thin cuts
+// elsewhere.
+TEST(CavityTools, ThePlanCutsTheSlotWithTheToolThatIsTold) {
+    Context context({.threads = 2});
+    test::DrilledPlate plate(60, 15);
+    const test::LoopAxis axis{{45, 30, 0}};
+    const auto ring = [](double z) {
+        test::Loop loop;
+        for (const double x : {-20.0, -10.0, 0.0, 10.0, 20.0}) loop.push_back({45 + x, 30 - 1.7, z});
+        for (const double x : {20.0, 10.0, 0.0, -10.0, -20.0}) loop.push_back({45 + x, 30 + 1.7, z});
+        return loop;
+    };
+    const Vec3d floor{45, 30, 3};
+    plate.cell(90, axis, {ring(15), ring(3)}, &floor);
+    const Mesh mesh = weld(context, test::rounded(plate.closed()));
+    Job job;
+    job.tools = *named_library("metric");
+    const FeatureSet features = find_features(context, mesh.view());
+    const Plan plan = make_plan(context, mesh, {}, job);
+    std::vector<double> tops;
+    for (const Layer& layer : plan.layers) tops.push_back(layer.z_top);
+    const auto found = advise_on_cavities(job, find_cavities(context, mesh.view(), tops, features.features));
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_NEAR(found[0].cavity.width_mm, 3.4, 1e-3);
+    ASSERT_TRUE(found[0].tool);
+    EXPECT_DOUBLE_EQ(found[0].tool->diameter_mm, 3);
+    bool cut = false;
+    for (const Layer& layer : plan.layers)
+        for (const Operation& op : layer.operations) {
+            const auto tool = std::find_if(job.tools.begin(), job.tools.end(),
+                                           [&](const Tool& t) { return t.number == op.tool; });
+            if (tool->diameter > found[0].tool->diameter_mm) continue;
+            cut |= op.tool == found[0].tool->number;
+            for (const Move& m : op.moves) {
+                if (m.feed == 0) continue;
+                EXPECT_LT(std::abs(to_mm(m.x) - 45), 21) << op.purpose;
+                EXPECT_LT(std::abs(to_mm(m.y) - 30), 3) << op.purpose;
+            }
+        }
+    EXPECT_TRUE(cut);
 }
 
 TEST(Catalogue, FlutesAreTheShortestThatSuffice) {

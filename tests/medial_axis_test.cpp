@@ -144,7 +144,9 @@ TEST(MedialAxis, ClearancesAreDistancesToTheBorder) {
         for (const MedialPoint& p : axis.points) {
             const Point2 place{to_units(p.x), to_units(p.y)};
             EXPECT_NEAR(distance(place), p.clearance, 4e-4);
-            if (p.clearance > 0.01) EXPECT_EQ(winding(solid, place), 0);
+            if (p.clearance > 0.01) {
+                EXPECT_EQ(winding(solid, place), 0);
+            }
         }
         for (const MedialLink& l : axis.links)
             EXPECT_LE(std::hypot(axis.points[l.from].x - axis.points[l.to].x,

@@ -110,19 +110,29 @@ TEST(MissingTools, NothingIsMissingWhereAllIsReached) {
     EXPECT_TRUE(found.missing.empty());
 }
 
-TEST(MissingToolsCorpus, AMouldCavityGainsWhatIsForetold) {
+/// A casting of the corpus with the default job; none where there is no corpus.
+void expect_gain_of_casting(const std::string& name, const Job& job) {
     const char* corpus = std::getenv("SLABWRIGHT_CORPUS");
     if (corpus == nullptr) {
         std::puts("skipped: SLABWRIGHT_CORPUS is not set");
         return;
     }
     TemporaryFolder folder;
-    const std::string stl = fs::path(corpus) / "castings/mold_cavity_ktool.stl";
-    const Job job;
+    const std::string stl = fs::path(corpus) / "castings" / name;
     const Verification found = planned_and_verified(stl, job, folder.path / "out");
     ASSERT_FALSE(found.missing.empty());
     EXPECT_LE(found.missing.size(), 10u);
     expect_gain(stl, job, folder.path, found, found.missing.front());
+}
+
+TEST(MissingToolsCorpus, AMouldCavityGainsWhatIsForetold) {
+    expect_gain_of_casting("mold_cavity_ktool.stl", {});
+}
+
+TEST(MissingToolsCorpus, ACylinderHeadGainsWhatIsForetold) {
+    Job job;
+    job.allow_undercut = true;
+    expect_gain_of_casting("wallaby_cylinder_head_casting.stl", job);
 }
 
 }  // namespace

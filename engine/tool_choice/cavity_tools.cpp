@@ -12,8 +12,9 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kLeastLeft = 1;      // mm²: less is not worth a tool
-constexpr double kMostLeft = 0.05;    // of what the library leaves, that a named tool may leave
+constexpr double kLeastLeft = 1;    // mm²: less is not worth a tool
+constexpr double kMostLeft = 0.05;  // of what the library leaves, that a named tool may leave
+constexpr double kHalf = 0.5;
 constexpr double kSameLength = 1e-6;  // mm
 
 double step_of(const Job& job, double diameter, double stickout) {
@@ -62,24 +63,40 @@ std::optional<double> boundary_for(const CavityAdvice& advice, double length) {
     return {};
 }
 
-void name_missing(const Job& job, CavityAdvice& advice, double left) {
-    const NarrowCavity& cavity = advice.cavity;
-    const std::vector<CatalogueSize> sizes = catalogue_sizes(job.units == LengthUnit::inch);
+/// The thickest size that leaves at most a twentieth of what the library leaves; where there is none, the one
+/// from which on thinner ones gain little.
+template <class Fits>
+const CatalogueSize* thickest(const std::vector<CatalogueSize>& sizes, const NarrowCavity& cavity,
+                              double left, Fits&& fits) {
     const CatalogueSize* chosen = nullptr;
     for (const CatalogueSize& size : sizes) {
         const double leaves = cavity.area_under(size.diameter_mm);
-        if (left - leaves < kLeastLeft) continue;
+        if (left - leaves < kLeastLeft || !fits(size)) continue;
         if (chosen == nullptr || leaves < (1 - kMostLeft) * cavity.area_under(chosen->diameter_mm))
             chosen = &size;
         if (leaves <= kMostLeft * left) break;
     }
-    if (chosen == nullptr) return;
+    return chosen;
+}
+
+void name_missing(const Job& job, CavityAdvice& advice, double left) {
+    const NarrowCavity& cavity = advice.cavity;
+    const std::vector<CatalogueSize> sizes = catalogue_sizes(job.units == LengthUnit::inch);
     const double needed = advice.reach_mm + job.cutting.holder_clearance;
-    const double longest = longest_catalogue_flutes(chosen->diameter_mm);
-    const std::optional<double> flutes = catalogue_flutes(chosen->diameter_mm, needed);
-    if (!flutes) advice.boundary_mm = boundary_for(advice, longest - job.cutting.holder_clearance);
-    if (flutes || advice.boundary_mm)
-        advice.missing = of_catalogue(job, cavity, *chosen, flutes.value_or(longest));
+    const auto flutes = [&](const CatalogueSize& size) { return catalogue_flutes(size.diameter_mm, needed); };
+    const CatalogueSize* any = thickest(sizes, cavity, left, [](const CatalogueSize&) { return true; });
+    if (any == nullptr) return;
+    // A tool that can be had is worth more than a boundary, if it does at least half.
+    const CatalogueSize* long_enough =
+        thickest(sizes, cavity, left, [&](const CatalogueSize& size) { return flutes(size).has_value(); });
+    if (long_enough != nullptr &&
+        (flutes(*any) || cavity.area_under(long_enough->diameter_mm) <= kHalf * left)) {
+        advice.missing = of_catalogue(job, cavity, *long_enough, *flutes(*long_enough));
+        return;
+    }
+    const double longest = longest_catalogue_flutes(any->diameter_mm);
+    advice.boundary_mm = boundary_for(advice, longest - job.cutting.holder_clearance);
+    if (advice.boundary_mm) advice.missing = of_catalogue(job, cavity, *any, longest);
 }
 
 CavityAdvice advise(const Job& job, const NarrowCavity& cavity) {

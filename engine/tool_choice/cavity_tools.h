@@ -18,7 +18,7 @@ struct CavityTool {
     double diameter_mm = 0, flute_length_mm = 0, stickout_mm = 0;
     double left_mm2 = 0;  ///< of the cavity, seen from above, that it does not enter
     double step_mm = 0;   ///< the deepest that it cuts at once, for its edges' force alone not to bend it by
-                         ///< more than tolerances.cusp; half its diameter at most
+                          ///< more than tolerances.cusp; half its diameter at most
 };
 
 struct CavityAdvice {
@@ -28,8 +28,9 @@ struct CavityAdvice {
     double stickout_mm = 0;  ///< that a tool needs for it, cutting.holder_clearance counted
     /// Of the library's end mills that are long enough the widest of those that leave least.
     std::optional<CavityTool> tool;
-    /// Of a catalogue the thickest flat end mill that reaches all but a twentieth of what the library leaves;
-    /// none where the library leaves less than a square millimetre.
+    /// Of a catalogue the thickest flat end mill that reaches all but a twentieth of what the library leaves,
+    /// or, where that one would be too short, one that is long enough and reaches at least half. None where
+    /// the library leaves less than a square millimetre.
     std::optional<CavityTool> missing;
     /// z of a layer boundary without which that tool, or one of the library that is narrow enough, is too
     /// short.

@@ -98,12 +98,10 @@ void look_at_sides(Context& context, MeshView mesh, const Job& job, Inspection& 
 void look_at_cavities(Context& context, MeshView mesh, const Job& job, const CavityOptions& limits,
                       Inspection& result) {
     result.cavity_limits = limits;
-    const Box3 box = bounds(context, mesh);
-    std::vector<double> tops{double{box.max.z}};
-    if (!result.ways.empty()) {
-        tops = result.ways.front().above.tops;
-        for (double& top : tops) top += box.min.z;
-    }
+    if (result.ways.empty()) return;  // no layers can be placed, which is told
+    std::vector<double> tops = result.ways.front().above.tops;
+    const double base = bounds(context, mesh).min.z;
+    for (double& top : tops) top += base;
     result.cavities = advise_on_cavities(job, find_cavities(context, mesh, tops, result.features, limits));
 }
 

@@ -28,7 +28,7 @@ struct Inspection {
     /// What would stay unmade if the pattern were one layer; layer boundaries can only make it less.
     std::vector<UnmadeUndercut> undercuts;
     std::vector<RoundHole> holes;
-    /// Of the job's layers; of one layer where none can be placed.
+    /// Of the job's layers; not looked for where none can be placed.
     std::vector<CavityAdvice> cavities;
     CavityOptions cavity_limits;
     std::vector<EdgeChain> edges;
