@@ -145,6 +145,33 @@ TEST(Cavities, StepsAreDividedAndLeaningWallsAreNot) {
     EXPECT_NEAR(draft.depth_mm(), 20, 1e-5);
 }
 
+TEST(Cavities, TheyDoNotDependOnThreads) {
+    test::DrilledPlate plate(60, 30);
+    for (int i = 0; i < 4; ++i) {
+        const LoopAxis axis{{plate.next_x() + 30, 30, 0}};
+        const Vec3d floor{axis.at[0], 30, 4.0 + i};
+        plate.cell(60, axis,
+                   {rectangle(axis, 40, 8, 0.4 * i, 30), rectangle(axis, 38, 6 - i, 0.4 * i, 4.0 + i)},
+                   &floor);
+    }
+    const auto of = [&](int threads) {
+        Context context({.threads = threads});
+        const Mesh mesh = weld(context, test::rounded(plate.closed()));
+        return cavities_of(context, mesh, {15, 30});
+    };
+    const auto one = of(1), four = of(4);
+    ASSERT_EQ(one.size(), 4U);
+    ASSERT_EQ(four.size(), 4U);
+    for (std::size_t i = 0; i < 4; ++i) {
+        EXPECT_EQ(one[i].at, four[i].at);
+        EXPECT_EQ(one[i].width_mm, four[i].width_mm);
+        EXPECT_EQ(one[i].area_mm2(), four[i].area_mm2());
+        EXPECT_EQ(one[i].length_mm, four[i].length_mm);
+        ASSERT_EQ(one[i].layers.size(), 2U);
+        EXPECT_EQ(one[i].layers[1].low_mm, 15) << "where the upper layer begins";
+    }
+}
+
 TEST(Cavities, WhatIsWideOrShallowIsNone) {
     Context context;
     test::DrilledPlate plate(60, 30);
