@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 
 #include "io/slabwright.h"
 #include "io/verify.h"
@@ -47,7 +48,9 @@ void write_ribs(const fs::path& path, const std::vector<float>& gaps) {
 
 Verification planned_and_verified(const std::string& stl, const Job& job, const fs::path& out) {
     Context context({.threads = 1});
-    write(context, plan(context, stl, job), out.string());
+    const std::shared_ptr<Pattern> pattern = read_pattern(context, stl, job);
+    Plan made = plan(context, *pattern, job);
+    EXPECT_TRUE(write_proven(context, made, out.string(), pattern).passed);
     return verify_folder(context, out.string(), {.source = stl, .write = false});
 }
 
@@ -133,6 +136,12 @@ TEST(MissingToolsCorpus, ACylinderHeadGainsWhatIsForetold) {
     Job job;
     job.allow_undercut = true;
     expect_gain_of_casting("wallaby_cylinder_head_casting.stl", job);
+}
+
+TEST(MissingToolsCorpus, ABearingHousingGainsWhatIsForetold) {
+    Job job;
+    job.allow_undercut = true;
+    expect_gain_of_casting("bearing_block.stl", job);
 }
 
 }  // namespace
