@@ -26,6 +26,7 @@
 #include "io/write/draw_json.h"
 #include "io/write/output_file.h"
 #include "io/write/report_as_built.h"
+#include "io/write/report_cavities.h"
 #include "io/write/report_draw.h"
 #include "io/write/report_outlines.h"
 #include "io/write/report_reach.h"
@@ -320,12 +321,18 @@ void draw_figures(Context& context, MeshView mesh, const PlannedFolder& folder, 
                       {"undercut_mm2", rounded(slopes.undercut_mm2, 1)}};
 }
 
-/// What keeps the pattern from being drawn. It is looked for before all else, while memory is left.
-void check_draw_of(Context& context, MeshView mesh, Figures& figures) {
+/// What keeps the pattern from being drawn, and where it is narrow. It is looked for before all else, while
+/// memory is left.
+void look_at_pattern(Context& context, MeshView mesh, const PlannedFolder& folder, Figures& figures) {
     figures.draw = draw_within_memory(context, mesh);
     JsonText draw;
     put_draw(draw, figures.draw);
     figures.data["draw"] = Json::parse(draw.take());
+    Job job = folder.build.job;
+    job.tools = folder.simulation.tools;
+    std::vector<double> tops;
+    for (const SimulatedLayer& layer : folder.simulation.layers) tops.push_back(layer.z_top);
+    figures.data["cavities"] = Json::parse(report_cavities(context, mesh, job, tops));
 }
 
 /// The pattern for the 3D view: places as 16-bit shares of its box.
@@ -506,7 +513,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
     Figures figures;
     figures.data = {
         {"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", plan}, {"verify", verify}};
-    check_draw_of(context, mesh, figures);
+    look_at_pattern(context, mesh, folder, figures);
     const auto draw = [&] {
         Json& steps = figures.data["steps"] = Json::array();
         if (sequence.is_object())

@@ -25,6 +25,7 @@
 #include "io/read/pattern_source.h"
 #include "kernels/errors.h"
 #include "kernels/export.h"
+#include "kernels/features/cavities.h"
 #include "kernels/features/draw.h"
 #include "kernels/parallel/context.h"
 
@@ -208,12 +209,15 @@ enum class InspectionForm : std::uint8_t {
 };
 
 struct InspectionOptions {
-    DrawLimits draw;  ///< of what keeps it from being drawn
-    std::string map;  ///< file for the pattern coloured by that, PLY; "": none
+    DrawLimits draw;         ///< of what keeps it from being drawn
+    CavityOptions cavities;  ///< of what is narrow and deep
+    double edge_deg = 30;    ///< edges are sharp at which faces turn by that; 1 to 179
+    std::string map;         ///< file for the pattern coloured by that, PLY; "": none
 };
 
-/// Mesh report, features, undercuts, what layers leave on each side, and what keeps the pattern from being
-/// drawn. @throws Error(input) when the file cannot be read or the map not written, Error(usage)
+/// Mesh report, features, undercuts, sharp edges, narrow cavities, what layers leave on each side, and what
+/// keeps the pattern from being drawn. @throws Error(input) when the file cannot be read or the map not
+/// written, Error(usage)
 [[nodiscard]] SLABWRIGHT_API std::string inspect(Context& context, const PatternSource& source,
                                                  const Job& job, InspectionForm form = InspectionForm::json,
                                                  const InspectionOptions& options = {});

@@ -8,6 +8,7 @@
 
 #include "io/write/stl_writer.h"
 #include "kernels/mesh/weld.h"
+#include "tests/mesh_shapes.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
 #include "tests/support/schema.h"
@@ -129,6 +130,66 @@ TEST(InspectCommand, TellsDraftThinWallsAndCorners) {
     EXPECT_NE(people.out.find("undercut to the draw: "), std::string::npos) << people.out;
     EXPECT_EQ(slabwright_command({"inspect", stl, "--draft", "50"}).exit, 2);
     EXPECT_EQ(slabwright_command({"inspect", stl, "--map", folder / "no/such/place.ply"}).exit, 3);
+}
+
+TEST(InspectCommand, TellsSharpEdges) {
+    const TemporaryFolder folder;
+    const std::string stl = folder / "box.stl";
+    {
+        using namespace slabwright;
+        Context context({.threads = 1});
+        write_stl(stl, weld(context, shapes::box({0, 0, 0}, {30, 20, 10})));
+    }
+    const CommandResult told = slabwright_command({"inspect", stl, "--json"});
+    ASSERT_EQ(told.exit, 0) << told.err;
+    EXPECT_EQ(schema_complaint(told.out, kSchema), "");
+    const json edges = json::parse(told.out).at("edges");
+    EXPECT_EQ(edges.at("convex"), json({{"chains", 12}, {"closed", 0}, {"length", 240}}));
+    EXPECT_EQ(edges.at("concave").at("chains"), 0);
+    EXPECT_EQ(edges.at("longest")[0].at("sharpest_deg"), 90);
+    const CommandResult people = slabwright_command({"inspect", stl});
+    EXPECT_NE(people.out.find("240 mm convex in 12 chains (0 closed), 0 mm concave in 0 chains"),
+              std::string::npos)
+        << people.out;
+    const json none = json::parse(slabwright_command({"inspect", stl, "--json", "--edges", "91"}).out);
+    EXPECT_EQ(none.at("edges").at("convex").at("chains"), 0);
+    EXPECT_EQ(slabwright_command({"inspect", stl, "--edges", "180"}).exit, 2);
+}
+
+TEST(InspectCommand, TellsNarrowCavitiesAndTheirTools) {
+    const TemporaryFolder folder;
+    const std::string stl = folder / "slot.stl";
+    {
+        using namespace slabwright;
+        using Corner = std::array<Vec3f, 3>;
+        std::vector<Corner> walls;  // 5 mm between two walls on a plate, 16 mm deep
+        const auto box = [&](Vec3f low, Vec3f high) {
+            for (const Corner& c : shapes::box(low, high)) walls.push_back(c);
+        };
+        box({0, 0, 0}, {80, 60, 2.5F});
+        box({10, 10, 2}, {35, 50, 18});
+        box({40, 10, 2}, {65, 50, 18});
+        Context context({.threads = 1});
+        write_stl(stl, weld(context, walls));
+    }
+    const CommandResult told = slabwright_command({"inspect", stl, "--json"});
+    ASSERT_EQ(told.exit, 0) << told.err;
+    EXPECT_EQ(schema_complaint(told.out, kSchema), "");
+    const json cavities = json::parse(told.out).at("cavities");
+    ASSERT_EQ(cavities.at("places"), 1) << cavities.dump();
+    const json slot = cavities.at("slenderest")[0];
+    EXPECT_NEAR(slot.at("width").get<double>(), 5, 1e-3);
+    EXPECT_NEAR(slot.at("depth").get<double>(), 15.5, 1e-3);
+    EXPECT_NEAR(slot.at("where")[0].get<double>(), 37.5, 1e-3);
+    EXPECT_TRUE(slot.at("tool").is_null());
+    EXPECT_EQ(slot.at("missing").at("diameter"), 5);
+    const CommandResult people = slabwright_command({"inspect", stl});
+    EXPECT_NE(people.out.find("5.00 mm wide, 15.50 deep (3.1 times)"), std::string::npos) << people.out;
+    EXPECT_NE(people.out.find("flat end mill 5 mm x "), std::string::npos) << people.out;
+    const CommandResult metric = slabwright_command({"inspect", stl, "--tools", "metric"});
+    EXPECT_NE(metric.out.find("tool 6 reaches all of it"), std::string::npos) << metric.out << metric.err;
+    EXPECT_EQ(slabwright_command({"inspect", stl, "--slender", "4"}).out.find("mm wide"), std::string::npos);
+    EXPECT_EQ(slabwright_command({"inspect", stl, "--narrow", "0.1"}).exit, 2);
 }
 
 }  // namespace

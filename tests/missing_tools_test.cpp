@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 
 #include "io/slabwright.h"
 #include "io/verify.h"
@@ -47,7 +48,9 @@ void write_ribs(const fs::path& path, const std::vector<float>& gaps) {
 
 Verification planned_and_verified(const std::string& stl, const Job& job, const fs::path& out) {
     Context context({.threads = 1});
-    write(context, plan(context, stl, job), out.string());
+    const std::shared_ptr<Pattern> pattern = read_pattern(context, stl, job);
+    Plan made = plan(context, *pattern, job);
+    (void)write_proven(context, made, out.string(), pattern, true);  // keeps what does not pass
     return verify_folder(context, out.string(), {.source = stl, .write = false});
 }
 
@@ -60,10 +63,10 @@ Job with(Job job, Tool tool) {
 }
 
 void expect_gain(const std::string& stl, const Job& job, const fs::path& folder, const Verification& before,
-                 const MissingTool& missing) {
+                 const MissingTool& missing, bool passes = true) {
     SCOPED_TRACE(missing.tool.name);
     const Verification after = planned_and_verified(stl, with(job, missing.tool), folder / "again");
-    EXPECT_TRUE(after.report.passed());
+    EXPECT_EQ(after.report.passed(), passes);
     const double gained = before.report.unreachable_mm2() - after.report.unreachable_mm2();
     EXPECT_NEAR(gained, missing.gain_mm2, std::max(0.05 * missing.gain_mm2, 1.0))
         << "of " << before.report.unreachable_mm2() << " mm²; " << missing.minutes << " min foretold";
@@ -110,19 +113,37 @@ TEST(MissingTools, NothingIsMissingWhereAllIsReached) {
     EXPECT_TRUE(found.missing.empty());
 }
 
-TEST(MissingToolsCorpus, AMouldCavityGainsWhatIsForetold) {
+/// A casting of the corpus with the default job; none where there is no corpus.
+void expect_gain_of_casting(const std::string& name, const Job& job, bool passes = true) {
     const char* corpus = std::getenv("SLABWRIGHT_CORPUS");
     if (corpus == nullptr) {
         std::puts("skipped: SLABWRIGHT_CORPUS is not set");
         return;
     }
     TemporaryFolder folder;
-    const std::string stl = fs::path(corpus) / "castings/mold_cavity_ktool.stl";
-    const Job job;
+    const std::string stl = fs::path(corpus) / "castings" / name;
     const Verification found = planned_and_verified(stl, job, folder.path / "out");
     ASSERT_FALSE(found.missing.empty());
     EXPECT_LE(found.missing.size(), 10u);
-    expect_gain(stl, job, folder.path, found, found.missing.front());
+    expect_gain(stl, job, folder.path, found, found.missing.front(), passes);
+}
+
+TEST(MissingToolsCorpus, AMouldCavityGainsWhatIsForetold) {
+    expect_gain_of_casting("mold_cavity_ktool.stl", {});
+}
+
+TEST(MissingToolsCorpus, ACylinderHeadGainsWhatIsForetold) {
+    Job job;
+    job.allow_undercut = true;
+    expect_gain_of_casting("wallaby_cylinder_head_casting.stl", job);
+}
+
+// With the 2 mm end mill its plan leaves 14.5 mm² in layer 3 that a tool could take, which no mending
+// removes: a fault of the planner. When that is mended this test says so.
+TEST(MissingToolsCorpus, ABearingHousingGainsWhatIsForetold) {
+    Job job;
+    job.allow_undercut = true;
+    expect_gain_of_casting("bearing_block.stl", job, false);
 }
 
 }  // namespace

@@ -7,8 +7,8 @@
 
 namespace slabwright {
 
-/// Adds the limits of draft, thin walls and corners to the command, and the map; model and reading are added
-/// by the caller.
+/// Adds the limits of draft, thin walls, corners, sharp edges and narrow cavities to the command, and the
+/// map; model and reading are added by the caller.
 void add_inspection_options(CLI::App& command, InspectionOptions& options);
 
 }  // namespace slabwright

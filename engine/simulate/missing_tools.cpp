@@ -11,6 +11,7 @@
 #include <numeric>
 #include <optional>
 
+#include "engine/catalogue.h"
 #include "engine/simulate/reach.h"
 #include "kernels/forces/deflection.h"
 #include "kernels/parallel/parallel.h"
@@ -25,69 +26,41 @@ constexpr double kLeastGain = 1.0;      // mm²: less is not worth a tool
 constexpr double kMore = 1.02;          // times what a thicker tool gains
 constexpr std::size_t kMostTools = 10;  // that are named
 
-// End mills of 1 to 12 mm, and of 1/32 to 1/2 in, that router and mould shops' catalogues have as straight
-// tools; larger ones are in every library.
-constexpr double kMetric[] = {12, 10, 8, 6, 5, 4, 3, 2.5, 2, 1.5, 1};
-struct InchSize {
-    double inches;
-    const char* words;
-};
-constexpr InchSize kInches[] = {{0.5, "1/2"},   {0.375, "3/8"},    {0.25, "1/4"},    {0.1875, "3/16"},
-                                {0.125, "1/8"}, {0.09375, "3/32"}, {0.0625, "1/16"}, {0.03125, "1/32"}};
-// Flute lengths in diameters: standard, long, extra long, and with a relieved neck.
-constexpr double kRatios[] = {3, 4, 6, 8, 10, 12};
-constexpr double kGrip = 3;              // mm between flutes and collet: each more bends a thin tool more
 constexpr double kFeedPerTooth = 0.012;  // of the diameter, in MDF
 constexpr double kEntry = 0.05;  // minutes for each place that a cutter goes down to: rapids, plunge, leads
 
-struct Size {
-    double diameter;
-    std::string words;
-};
-
-std::vector<Size> sizes(bool inch) {
-    std::vector<Size> list;
-    if (inch)
-        for (const InchSize& s : kInches) list.push_back({s.inches * kInch, std::string(s.words) + " in"});
-    else
-        for (const double d : kMetric) list.push_back({d, fmt::format("{:g} mm", d)});
-    return list;
-}
-
 /// The shortest tool of a size whose flutes leave the layers as they are; nothing where none is long enough.
-std::optional<Tool> tool_of(const Size& size, ToolKind kind, const SimulationInput& input,
+std::optional<Tool> tool_of(const CatalogueSize& size, ToolKind kind, const SimulationInput& input,
                             const MissingToolOptions& options) {
     double tallest = 0;
     for (const SimulatedLayer& layer : input.layers)
         tallest = std::max(tallest, layer.z_top - layer.z_bottom);
     const double overrun =
-        kind == ToolKind::ball ? size.diameter / 2 * (1 - std::cos(options.vertical_rad)) : 0;
+        kind == ToolKind::ball ? size.diameter_mm / 2 * (1 - std::cos(options.vertical_rad)) : 0;
     const double needed = tallest + overrun + options.holder_clearance;
-    for (const double ratio : kRatios) {
-        if (ratio * size.diameter < needed - 1e-9) continue;
-        Tool tool;
-        tool.kind = kind;
-        tool.name = fmt::format("{} end mill {}", kind == ToolKind::ball ? "ball" : "flat", size.words);
-        tool.diameter = tool.shank_diameter = size.diameter;
-        tool.flute_length = ratio * size.diameter;
-        tool.stickout = tool.flute_length + kGrip;
-        tool.plunges = plunges_by_default(kind);
-        // What else a job must say, as the library's own nearest tool of the kind has it.
-        const Tool* like = nullptr;
-        for (const Tool& t : input.tools)
-            if (t.kind == kind && (like == nullptr || std::abs(t.diameter - size.diameter) <
-                                                          std::abs(like->diameter - size.diameter)))
-                like = &t;
-        tool.holder_diameter = like != nullptr ? like->holder_diameter : 32;
-        tool.max_rpm = std::min(tool.max_rpm, input.machine.max_rpm);
-        tool.max_feed =
-            std::min(input.machine.max_feed, kFeedPerTooth * size.diameter * tool.flutes * tool.max_rpm);
-        tool.plunge_feed = tool.max_feed / 3;
-        tool.stepdown_min = size.diameter / 4;
-        tool.stepdown_max = size.diameter / 2;
-        return tool;
-    }
-    return {};
+    const std::optional<double> flutes = catalogue_flutes(size.diameter_mm, needed);
+    if (!flutes) return {};
+    Tool tool;
+    tool.kind = kind;
+    tool.name = fmt::format("{} end mill {}", kind == ToolKind::ball ? "ball" : "flat", size.words);
+    tool.diameter = tool.shank_diameter = size.diameter_mm;
+    tool.flute_length = *flutes;
+    tool.stickout = tool.flute_length + kCatalogueGrip;
+    tool.plunges = plunges_by_default(kind);
+    // What else a job must say, as the library's own nearest tool of the kind has it.
+    const Tool* like = nullptr;
+    for (const Tool& t : input.tools)
+        if (t.kind == kind && (like == nullptr || std::abs(t.diameter - size.diameter_mm) <
+                                                      std::abs(like->diameter - size.diameter_mm)))
+            like = &t;
+    tool.holder_diameter = like != nullptr ? like->holder_diameter : 32;
+    tool.max_rpm = std::min(tool.max_rpm, input.machine.max_rpm);
+    tool.max_feed =
+        std::min(input.machine.max_feed, kFeedPerTooth * size.diameter_mm * tool.flutes * tool.max_rpm);
+    tool.plunge_feed = tool.max_feed / 3;
+    tool.stepdown_min = size.diameter_mm / 4;
+    tool.stepdown_max = size.diameter_mm / 2;
+    return tool;
 }
 
 /// A cell that is out of reach, and how far down in its column a tool must get for no more to be left than
@@ -232,7 +205,7 @@ std::vector<MissingTool> missing_tools(Context& context, const SimulationInput& 
     };
     std::array<std::vector<Candidate>, 2> kinds;
     for (std::size_t k = 0; k < 2; ++k)
-        for (const Size& size : sizes(options.inch)) {
+        for (const CatalogueSize& size : catalogue_sizes(options.inch)) {
             const ToolKind kind = k == 0 ? ToolKind::flat : ToolKind::ball;
             if (const auto tool = tool_of(size, kind, input, options))
                 kinds[k].push_back({*tool, std::vector<char>(samples.size(), 0)});

@@ -7,8 +7,10 @@
 #include <numbers>
 
 #include "io/text/json_text.h"
+#include "io/write/cavities_json.h"
 #include "io/write/draw_json.h"
 #include "io/write/draw_ply.h"
+#include "io/write/edges_json.h"
 #include "io/write/milled_ways_json.h"
 #include "io/write/output_file.h"
 #include "io/write/plan_json.h"
@@ -93,6 +95,16 @@ void look_at_sides(Context& context, MeshView mesh, const Job& job, Inspection& 
     }
 }
 
+void look_at_cavities(Context& context, MeshView mesh, const Job& job, const CavityOptions& limits,
+                      Inspection& result) {
+    result.cavity_limits = limits;
+    if (result.ways.empty()) return;  // no layers can be placed, which is told
+    std::vector<double> tops = result.ways.front().above.tops;
+    const double base = bounds(context, mesh).min.z;
+    for (double& top : tops) top += base;
+    result.cavities = advise_on_cavities(job, find_cavities(context, mesh, tops, result.features, limits));
+}
+
 }  // namespace
 
 Inspection inspect_pattern(Context& context, const PatternSource& source, const Job& job,
@@ -116,6 +128,8 @@ Inspection inspect_pattern(Context& context, const PatternSource& source, const 
         result.disagreements = std::move(found.disagreements);
         context.begin_phase("holes", 0.6, 0.7);
         result.holes = find_holes(context, pattern.mesh.view());
+        result.edges = find_edge_chains(context, pattern.mesh.view(), asked.edge_deg);
+        result.edge_limit_deg = asked.edge_deg;
         context.begin_phase("draw", 0.7, 0.72);
         result.draw = check_draw(context, pattern.mesh.view(), asked.draw);
         if (!asked.map.empty())
@@ -123,8 +137,10 @@ Inspection inspect_pattern(Context& context, const PatternSource& source, const 
         context.begin_phase("undercuts", 0.72, 0.75);
         const double tops[] = {double{bounds(pattern.mesh.view()).max.z}};
         result.undercuts = measure_undercuts(context, pattern.mesh.view(), tops, options);
-        context.begin_phase("sides", 0.75, 1.0);
+        context.begin_phase("sides", 0.75, 0.9);
         look_at_sides(context, pattern.mesh.view(), job, result);
+        context.begin_phase("cavities", 0.9, 1.0);
+        look_at_cavities(context, pattern.mesh.view(), job, asked.cavities, result);
     }
     result.report = std::move(pattern.report);
     return result;
@@ -171,6 +187,12 @@ std::string inspection_json(const Inspection& inspection) {
     }
     json.end();
     put_holes(json, inspection.holes);
+    json.key("edges");
+    if (inspection.solid) put_edges(json, inspection.edges, inspection.edge_limit_deg);
+    else json.null();
+    json.key("cavities");
+    if (inspection.solid) put_cavities(json, inspection.cavities, inspection.cavity_limits);
+    else json.null();
     json.key("undercuts").begin_array();
     for (const UnmadeUndercut& u : inspection.undercuts) {
         json.begin_object(Shape::line).key("type").string(name(u.type));
@@ -227,6 +249,7 @@ std::string inspection_text(const Inspection& inspection) {
         text += hole_line(inspection.holes[i]);
     if (inspection.holes.size() > shown)
         text += fmt::format("  and {} more holes\n", inspection.holes.size() - shown);
+    text += edges_text(inspection.edges, inspection.edge_limit_deg) + cavities_text(inspection.cavities);
     text += inspection.undercuts.empty() && inspection.solid ? "  undercuts   none\n" : "";
     for (std::size_t i = 0; i < std::min(shown, inspection.undercuts.size()); ++i) {
         const UnmadeUndercut& u = inspection.undercuts[i];

@@ -1,13 +1,16 @@
-// What `slabwright inspect` finds in a file: the mesh report, features and undercuts; no plan.
+// What `slabwright inspect` finds in a file: the mesh report, features, undercuts, sharp edges, narrow
+// cavities; no plan.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "engine/planner/milled_ways.h"
+#include "engine/tool_choice/cavity_tools.h"
 #include "io/read/pattern_mesh.h"
 #include "io/slabwright.h"
 #include "kernels/features/draw.h"
+#include "kernels/features/edge_chains.h"
 #include "kernels/features/features.h"
 #include "kernels/features/holes.h"
 
@@ -25,6 +28,11 @@ struct Inspection {
     /// What would stay unmade if the pattern were one layer; layer boundaries can only make it less.
     std::vector<UnmadeUndercut> undercuts;
     std::vector<RoundHole> holes;
+    /// Of the job's layers; not looked for where none can be placed.
+    std::vector<CavityAdvice> cavities;
+    CavityOptions cavity_limits;
+    std::vector<EdgeChain> edges;
+    double edge_limit_deg = 0;
     /// What the job's layers would leave as it lies, and where that is anything, on its other five sides too.
     std::vector<MilledWay> ways;
     DrawReport draw;

@@ -70,6 +70,7 @@ const numbers = text => text.split(',').map(Number);
     check.that('data: steps are the build time', Math.abs(steps - plan.totals.build_minutes) < 0.02 * plan.totals.build_minutes, `${steps} ${plan.totals.build_minutes}`);
     check.equal('tables: rows', [await page.locator('#layers tbody tr').count(), await page.locator('#operations tbody tr').count(), await page.locator('#tools tbody tr').count()],
         [layers, plan.totals.operations, plan.tools.length]);
+    check.equal('tables: narrow cavities', await page.locator('#cavities tbody tr').count(), data.cavities.slenderest.length);
     check.equal('tables: draft and draw', await page.locator('#draw tbody tr').count(),
         ['little_draft', 'undercut_to_draw', 'thin_walls', 'inner_corners'].reduce((sum, kind) => sum + data.draw[kind].largest.length, 0));
     check.that('data: forces along every program', data.engagement.length === plan.totals.operations && plan.layers.flatMap(layer => layer.operations).every((o, i) => data.engagement[i].file === o.file && (o.minutes < 1 || data.engagement[i].force_n.some(f => f > 0))));

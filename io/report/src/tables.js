@@ -1,8 +1,8 @@
 // Tables that sort, lead to their place in the 3D view, and can be taken along as CSV.
 
-import {cutterOf, duration, figure, make, words} from './dom.js';
+import {cutterOf, duration, figure, make, plural, words} from './dom.js';
 import {drawPlaces, drawSums} from './draw.js';
-import {layerMinutes, operationName, operations, phases, plan, remarks, toolUse} from './report.js';
+import {data, layerMinutes, operationName, operations, phases, plan, remarks, toolUse} from './report.js';
 
 // columns: {name, of: row => value, text: row => shown, numeric}
 function sortable(id, title, columns, rows, place, show) {
@@ -86,6 +86,20 @@ function bands(operation) {
     return (operation.bands ?? []).map(b => `${figure(b.z_low, 1)} to ${figure(b.z_high, 1)}: ${figure(b.stepdown, 3)} at ${figure(b.least_slope_deg, 1)}°`).join('; ');
 }
 
+// The slenderest slots, gaps and small holes, and what to cut them with.
+function cavityTable(show) {
+    const {cavities} = data;
+    if (!cavities?.places) return [];
+    const title = `Narrow cavities (${plural(cavities.places, 'place')} up to ${figure(cavities.limits.width, 1)} mm wide)`;
+    return [sortable('cavities', title, [
+        number('Width, mm', r => r.width, 3), number('Widest, mm', r => r.widest, 3), number('Depth, mm', r => r.depth, 2), number('Depth to width', r => r.ratio, 1),
+        number('Length, mm', r => r.length, 1), number('Area, mm²', r => r.area, 1), text('Layers', r => r.layers[0].layer, r => r.layers.map(l => l.layer).join(', ')),
+        number('Stick-out needed, mm', r => r.stickout, 1), text('Tool', r => r.tool?.number ?? 0, r => r.tool ? `T${r.tool.number}` : 'none'),
+        number('It leaves, mm²', r => r.tool?.left, 1), text('Missing', r => r.missing?.name ?? ''), text('What to do', r => r.advice),
+        number('x', r => r.where[0]), number('y', r => r.where[1]), number('z', r => r.where[2]),
+    ], cavities.slenderest, r => ({where: r.where, text: r.advice}), show)];
+}
+
 export function buildTables(section, show) {
     section.classList.add('tables');
     const minutes = layerMinutes().map(row => phases.reduce((sum, phase) => sum + row[phase.key], 0));
@@ -115,6 +129,7 @@ export function buildTables(section, show) {
             text('Finding', r => r.kind), number('Area, mm²', r => r.area, 1), number('Length, mm', r => r.length, 1), text('Worst', r => r.worst),
             number('x', r => r.where[0]), number('y', r => r.where[1]), number('z', r => r.where[2]),
         ], drawPlaces, r => ({where: r.where, text: `${r.kind}, ${r.worst}`}), show),
+        ...cavityTable(show),
         sortable('remarks', 'Remarks and findings', [
             text('Code', r => r.code), {...text('Severity', r => r.severity), tone: r => r.severity}, text('From', r => r.source), text('Message', r => r.message),
             number('x', r => r.where?.[0]), number('y', r => r.where?.[1]), number('z', r => r.where?.[2]),
