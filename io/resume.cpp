@@ -14,6 +14,7 @@
 #include "engine/simulate/keep_out_check.h"
 #include "engine/simulate/planned_build.h"
 #include "engine/simulate/resume_point.h"
+#include "io/front_door.h"
 #include "io/posts/gcode_writer.h"
 #include "io/read/input_file.h"
 #include "io/read/planned_folder.h"
@@ -76,6 +77,13 @@ struct Loaded {
     std::vector<Program> face_offs;  // the texts of build.face_offs
 };
 
+/// The folder of a layer that is made again, before it is written.
+struct RemadeFolder {
+    std::string name;                       // in OUT
+    std::vector<std::string> files, texts;  // its programs, from OUT
+    std::string sequence;                   // the text
+};
+
 class Resumption {
 public:
     Resumption(Context& context, const std::string& directory, const ResumeOptions& options)
@@ -103,10 +111,11 @@ public:
         if (options_.after) {
             progress_.time_s = options_.now_s;
             known_ = true;
-            if (!options_.remake) write_progress();  // else with the layer that is made again, or not at all
         }
+        RemadeFolder remade;
+        if (options_.remake) remade = remake();
         ResumeStatus status;
-        if (options_.remake) status.programs = remake();
+        status.programs = remade.files;
         status.sequence = in_force_.file;
         status.after = progress_.after;
         if (known_) status.time_s = progress_.time_s;
@@ -117,6 +126,9 @@ public:
             known_ ? std::max(0.0, static_cast<double>(options_.now_s - progress_.time_s)) : 0;
         status.point = std::make_shared<const ResumePoint>(
             resume_point(in_force_.build, in_force_.sequence, progress_.state, waited));
+        // Nothing is written before all that could fail is done, and nothing can fail behind it.
+        if (options_.remake) write_remade(remade);
+        else if (options_.after) write_progress();
         return status;
     }
 
@@ -300,8 +312,8 @@ private:
         write_file_in(out_, kProgress, progress_json(progress_, in_force_.build, in_force_.sequence));
     }
 
-    /// Writes the folder of a remade layer, and has its sequence in force. @returns its programs, from OUT
-    std::vector<std::string> remake() {
+    /// Plans a layer once more, and has the sequence that makes it in force. Nothing is written.
+    RemadeFolder remake() {
         const Loaded own = load("sequence.json");
         const int number = last_folder(out_) + 1;
         if (number > kMostFolders)
@@ -314,39 +326,42 @@ private:
         remade.file = name + "/sequence.json";
         remade.sequence = in_force_.sequence;
         remade.sequence.steps = made.steps;
-        const std::string text = sequence_json(remade.sequence);
-        remade.sha256 = digest(text);
-        remade.sequence = read_sequence(text);
+        RemadeFolder folder{name, {}, {}, sequence_json(remade.sequence)};
+        remade.sha256 = digest(folder.sequence);
+        remade.sequence = read_sequence(folder.sequence);
         remade.build = in_force_.build;
         remade.face_offs = in_force_.face_offs;
-        std::vector<std::string> texts, files;
         for (std::size_t k = 0; k < made.layers.size(); ++k) {
             const Layer& layer = made.plan.layers[made.layers[k]];
-            texts.push_back(program_text(made.plan, layer, layer.operations[0]));
-            files.push_back(name + "/nc/" + layer.operations[0].file);
-            remade.face_offs.push_back(prove(made, k, texts.back(), files.back()));
+            folder.texts.push_back(program_text(made.plan, layer, layer.operations[0]));
+            folder.files.push_back(name + "/nc/" + layer.operations[0].file);
+            remade.face_offs.push_back(prove(made, k, folder.texts.back(), folder.files.back()));
             remade.build.face_offs.push_back(planned(remade.face_offs.back()));
         }
-        const BuildState state = replay_remade(remade);
-        OutputFolder folder((out_ / name).string());
-        make_output_directory((folder.path() / "nc").string());
-        for (std::size_t k = 0; k < texts.size(); ++k)
-            write_file_in(folder.path() / "nc", fs::path(files[k]).filename().string(), texts[k]);
-        write_file_in(folder.path(), "sequence.json", text);
-        folder.commit();
+        progress_.state = replay_remade(remade);
         in_force_ = std::move(remade);
         progress_.sequence = in_force_.file;
         progress_.sequence_sha256 = in_force_.sha256;
-        progress_.state = state;
         known_ = true;
+        return folder;
+    }
+
+    /// All of it, or nothing.
+    void write_remade(const RemadeFolder& remade) const {
+        OutputFolder folder((out_ / remade.name).string());
+        make_output_directory((folder.path() / "nc").string());
+        for (std::size_t k = 0; k < remade.texts.size(); ++k)
+            write_file_in(folder.path() / "nc", fs::path(remade.files[k]).filename().string(),
+                          remade.texts[k]);
+        write_file_in(folder.path(), "sequence.json", remade.sequence);
+        folder.commit();
         try {
             write_progress();
-        } catch (const Error&) {  // the sequence before stays in force
+        } catch (...) {  // the sequence before stays in force
             std::error_code ignored;
-            fs::remove_all(out_ / name, ignored);
+            fs::remove_all(out_ / remade.name, ignored);
             throw;
         }
-        return files;
     }
 
     [[noreturn]] void refuse_remake(const Violation& v) const {
@@ -400,7 +415,7 @@ private:
 }  // namespace
 
 ResumeStatus resume_build(Context& context, const std::string& directory, const ResumeOptions& options) {
-    return Resumption(context, directory, options).run();
+    return guarded([&] { return Resumption(context, directory, options).run(); });
 }
 
 }  // namespace slabwright

@@ -8,10 +8,8 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <exception>
 #include <filesystem>
 #include <fstream>
-#include <new>
 #include <optional>
 #include <set>
 
@@ -23,6 +21,7 @@
 #include "engine/simulate/work.h"
 #include "engine/tool_choice/access_map.h"
 #include "engine/tools/libraries.h"
+#include "io/front_door.h"
 #include "io/posts/dialect.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/probe_program.h"
@@ -60,29 +59,6 @@
 #include "kernels/slicing/solid_volume.h"
 
 namespace slabwright {
-
-namespace {
-
-/// The front door lets nothing out but Error.
-template <class Body>
-auto guarded(Body&& body) -> decltype(body()) {
-    try {
-        return body();
-    } catch (const Error&) {
-        throw;
-    } catch (const std::bad_alloc&) {
-        throw Error(ErrorKind::no_plan, "memory.exhausted", "the machine has no more memory", "",
-                    "give fewer facets, or a machine with more memory");
-    } catch (const std::filesystem::filesystem_error& error) {
-        throw Error(ErrorKind::input, "file.system", error.code().message(), error.path1().string(),
-                    "check the path and its rights");
-    } catch (const std::exception& error) {
-        throw Error(ErrorKind::no_plan, "internal", error.what(), "",
-                    "report this with the pattern and the job");
-    }
-}
-
-}  // namespace
 
 std::string version() { return SLABWRIGHT_VERSION; }
 

@@ -2,13 +2,17 @@
 // fall between its levels and the lines of its rasters: judged by the simulation of the emitted text.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <vector>
 
 #include "engine/planner/planner.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
+#include "io/write/stl_writer.h"
 #include "tests/data/sweep.h"
+#include "tests/support/height_field.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -67,6 +71,27 @@ TEST(Seams, LowWallsAreCutWhereverTheyStand) {
         EXPECT_EQ(layers[0].missed, 0U)
             << "moved by " << shift << " mm, " << layers[0].missed_left.size << " mm missed";
     }
+}
+
+// A boss on gently sloping ground: lines of the raster that come to its walls end there and begin anew behind
+// it.
+TEST(Seams, ARastersLinesEndAtABoss) {
+    Context context;
+    const support::TemporaryFolder folder;
+    const std::string stl = folder / "part.stl";
+    write_stl(stl, test::height_field(context, 32, 1.5, [](double x, double y) {
+                  return std::max(std::abs(x), std::abs(y)) < 8 ? 16 : 7 + 0.1 * x + 0.05 * y;
+              }));
+    const Plan made = plan(context, stl, Job{});
+    double raster = 0;
+    for (const Layer& layer : made.layers)
+        for (const Operation& op : layer.operations)
+            if (op.purpose == "projected raster") raster += op.cutting_mm;
+    ASSERT_GT(raster, 500);
+    write(context, made, folder / "out");
+    const Verification found =
+        verify_folder(context, folder / "out", {.source = stl, .cell = 0.5, .write = false});
+    EXPECT_TRUE(found.report.violations.empty()) << found.report.violations[0].message;
 }
 
 }  // namespace

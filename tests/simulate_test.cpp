@@ -753,8 +753,14 @@ TEST(Simulate, MapsCancelMemoryAndNonsense) {
     } catch (const Error& e) {
         EXPECT_EQ(e.code(), "memory.limit");
     }
+    // What tiles keep of programs and layers counts beside the stock of the one that is simulated.
+    const std::uint64_t one_stock = std::uint64_t{128} * 128 * 4 * (block.input.layers.size() + 4);
+    Context tight({.threads = 1, .memory_bytes = one_stock + 64});
     Context context;
     const StandingPart part(context, block.input.mesh);
+    SimulationOptions without_maps = block.options;
+    without_maps.maps = false;
+    EXPECT_THROW((void)simulate(tight, block.input, part, without_maps), Error);
     SimulationInput nonsense = block.input;
     nonsense.layers[0].z_top = nonsense.layers[0].z_bottom;
     EXPECT_THROW((void)simulate(context, nonsense, part, block.options), Error);

@@ -166,6 +166,27 @@ TEST(FacetRoles, TellFoldsFromWhicheverCorner) {
     }
 }
 
+// Within a box, where both sides of what does not fold are solid: only the fold itself makes the two unsure.
+TEST(FacetRoles, TellTheFoldOfTwoFacetsFromWhicheverCorner) {
+    Context context;
+    const Vec3f a{2, 2, 5}, b{12, 2, 5}, c{7, 10, 5}, d{7, 5, 5};
+    for (const bool exchanged : {false, true})
+        for (std::size_t turns = 0; turns < 9; ++turns) {
+            std::array<Vec3f, 3> up{a, b, c}, down{b, a, d};
+            std::rotate(up.begin(), up.begin() + static_cast<std::ptrdiff_t>(turns % 3), up.end());
+            std::rotate(down.begin(), down.begin() + static_cast<std::ptrdiff_t>(turns / 3), down.end());
+            if (exchanged) std::swap(up, down);
+            shapes::Facets facets = shapes::box({0, 0, 0}, {20, 20, 20});
+            facets.push_back(up);
+            facets.push_back(down);
+            const Mesh mesh = weld(context, facets);
+            const BulkVector<FacetRole> roles = facet_roles(context, mesh.view());
+            ASSERT_EQ(roles.size(), 14U);
+            EXPECT_EQ(std::count(roles.begin(), roles.end(), FacetRole::unsure), 2)
+                << exchanged << ' ' << turns;
+        }
+}
+
 TEST(Windings, AreThoseOfAngles) {
     Context context;
     std::mt19937 random(test::seed());

@@ -10,7 +10,7 @@
 
 #include <chrono>
 #include <cstdio>
-#include <string>
+#include <system_error>
 
 // jemalloc reads it as it starts; the environment's MALLOC_CONF goes before. Its rule that large pieces go
 // back to the system at once (oversize_threshold) would have every array of a layer cleared anew for the next
@@ -26,17 +26,22 @@ namespace {
 
 constexpr std::int64_t kForever = -1;
 
+/// Says something to one of jemalloc's arenas. Nothing is allocated: there may be no memory left.
+void tell_arena(unsigned arena, const char* what, void* value, std::size_t size) noexcept {
+    char name[64];
+    std::snprintf(name, sizeof name, "arena.%u.%s", arena, what);
+    mallctl(name, nullptr, nullptr, value, size);
+}
+
 // For arenas that are there and those that are to come. An arena that nobody uses yet has none of its own to
 // set.
-void keep_given_back(std::int64_t ms) {
+void keep_given_back(std::int64_t ms) noexcept {
     ssize_t value = ms;
     mallctl("arenas.dirty_decay_ms", nullptr, nullptr, &value, sizeof value);
     unsigned arenas = 0;
     std::size_t size = sizeof arenas;
     mallctl("arenas.narenas", &arenas, &size, nullptr, 0);
-    for (unsigned i = 0; i < arenas; ++i)
-        mallctl(("arena." + std::to_string(i) + ".dirty_decay_ms").c_str(), nullptr, nullptr, &value,
-                sizeof value);
+    for (unsigned i = 0; i < arenas; ++i) tell_arena(i, "dirty_decay_ms", &value, sizeof value);
 }
 
 // Bytes of the process that lie in the machine's memory, but for those of mapped files, as /proc/self/statm
@@ -56,18 +61,23 @@ std::uint64_t held(int statm) {
 KeptWithin::KeptWithin(std::uint64_t bytes) {
     const int statm = ::open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
     if (statm < 0) return;  // nobody could tell when it is too much
-    keep_given_back(kForever);
-    watch_ = std::thread([this, bytes, statm] {
+    const auto watch = [this, bytes, statm] {
         std::unique_lock lock(mutex_);
         while (!ends_.wait_for(lock, std::chrono::milliseconds(50), [&] { return ended_; })) {
             if (held(statm) <= bytes) continue;
             keep_given_back(kKeptMs);
-            mallctl(("arena." + std::to_string(MALLCTL_ARENAS_ALL) + ".purge").c_str(), nullptr, nullptr,
-                    nullptr, 0);
+            tell_arena(MALLCTL_ARENAS_ALL, "purge", nullptr, 0);
             break;
         }
         ::close(statm);
-    });
+    };
+    try {
+        keep_given_back(kForever);
+        watch_ = std::thread(watch);
+    } catch (const std::system_error&) {  // there is no thread to be had, and so nobody to watch
+        keep_given_back(kKeptMs);
+        ::close(statm);
+    }
 }
 
 KeptWithin::~KeptWithin() {

@@ -19,6 +19,7 @@
 #include <string>
 #include <string_view>
 
+#include "io/front_door.h"
 #include "io/orient.h"
 #include "io/prepare.h"
 #include "io/quote.h"
@@ -116,7 +117,7 @@ void with_context(const Options& options, [[maybe_unused]] std::uint64_t kept, B
     std::string output;
     {
         const Done done{bar};
-        output = body(context);
+        output = guarded([&] { return body(context); });
     }
     if (!options.quiet) print(output);
 }
@@ -252,7 +253,8 @@ bool run_verify(const Options& options) {
         const VerifyResult result = verify(context, options.out, options.stl, options.maps, options.cell,
                                            options.job_file.empty() ? nullptr : &keep_outs);
         passed = result.passed;
-        return verdict(result, options.out) + renew_report(context, options);
+        const std::string stale = renew_report(context, options);
+        return said(options, [&] { return verdict(result, options.out) + stale; });
     });
     return passed;
 }
@@ -261,7 +263,9 @@ void run_report(const Options& options) {
     with_context(options, [&](Context& context) {
         report(context, options.out, options.stl, !options.no_3d, options.size_limit_mb);
         if (!options.pdf.empty()) print_pdf(options.out + "/report.html", options.pdf);
-        return options.json ? report_summary_json(options.out) : options.out + "/report.html\n";
+        return said(options, [&] {
+            return options.json ? report_summary_json(options.out) : options.out + "/report.html\n";
+        });
     });
 }
 

@@ -1,6 +1,7 @@
 #include "tools/resume_command.h"
 
 #include <chrono>
+#include <new>
 
 namespace slabwright {
 
@@ -28,7 +29,12 @@ std::string run_resume(Context& context, const std::string& directory, const Res
         std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch())
             .count();
     const ResumeStatus status = resume_build(context, directory, now);
-    return json ? resume_json(status) : resume_text(status, directory);
+    try {
+        return json ? resume_json(status) : resume_text(status, directory);
+    } catch (const std::bad_alloc&) {
+        if (!options.after && !options.remake) throw;
+        return {};  // it is written, whether or not that can be said
+    }
 }
 
 }  // namespace slabwright

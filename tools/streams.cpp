@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <string>
+#include <string_view>
 
 #include "io/slabwright.h"
 
@@ -21,7 +23,11 @@ int complain(const Error& error, bool as_json, std::span<const Error> also) {
 }
 
 void print(std::string_view text) {
-    const std::string shown = terminal_text(text, false);
+    // Plain text goes as it is: where memory has ended, what was done can still be said.
+    const bool plain =
+        std::all_of(text.begin(), text.end(), [](char c) { return c == '\n' || (c >= ' ' && c <= '~'); });
+    const std::string cleaned = plain ? std::string() : terminal_text(text, false);
+    const std::string_view shown = plain ? text : cleaned;
     const bool written = std::fwrite(shown.data(), 1, shown.size(), stdout) == shown.size();
     if (written && std::fflush(stdout) == 0) return;
     throw Error(ErrorKind::input, "stdout.unwritable",

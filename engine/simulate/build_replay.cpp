@@ -260,6 +260,9 @@ private:
         if (!(std::abs(place.area_mm2 - area) <= slack))
             complain("sequence.glue",
                      fmt::format("its polygons have {:.3f} mm2, the step says {:.3f}", place.area_mm2, area));
+        if (std::abs(place.z - slab.z_bottom) > kLength)
+            complain("sequence.glue", fmt::format("its polygons lie at z = {:.3f} mm, the joint at {:.3f}",
+                                                  place.z, slab.z_bottom));
         for (std::size_t k = 0; k < 2; ++k)
             if (place.area_mm2 > 0 &&
                 (place.min[k] < slab.blank.min[k] - kLength || place.max[k] > slab.blank.max[k] + kLength)) {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -74,9 +75,9 @@ struct BuildPlan {
 /// Where glue goes on one joint, as the sequence states it: under each layer first, in their order.
 struct StatedGlue {
     int layer = 0;
-    double area_mm2 = 0;                         ///< of its loops, holes taken off
-    std::array<double, 2> min{0, 0}, max{0, 0};  ///< of its points, mm
-    double z = 0;                                ///< of the joint, mm, pattern-base; 0 where it is not stated
+    double area_mm2 = 0;                                  ///< of its loops, holes taken off
+    std::array<double, 2> min{0, 0}, max{0, 0};           ///< of its points, mm
+    double z = std::numeric_limits<double>::quiet_NaN();  ///< of the joint, mm, pattern-base; NaN: not stated
     std::vector<std::vector<std::array<double, 2>>> loops{};  ///< mm
     /// Of the machine's glue head, in the order in which they are laid: y, then x from and to, mm.
     std::vector<std::array<double, 3>> beads{};

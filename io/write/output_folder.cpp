@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <cstring>
 #include <mutex>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -82,8 +83,12 @@ std::vector<fs::directory_entry> entries_of(const fs::path& folder) {
     return entries;
 }
 
+bool lives(long process) { return ::kill(static_cast<pid_t>(process), 0) == 0 || errno != ESRCH; }
+
 /// Whether a name is that of a file of ours, or of one that a process was writing in its place.
 bool is_file_of_ours(const std::string& name) {
+    // What a killed `resume` was writing. Where it lives, a build is under way.
+    if (const auto maker = maker_of(name, "progress.json", kPartial)) return !lives(*maker);
     if (name == "verify.json.part") return true;  // earlier versions left it on a full disk
     return std::any_of(kFiles.begin(), kFiles.end(), [&](std::string_view known) {
         return name == known || maker_of(name, known, kPartial).has_value();
@@ -246,6 +251,25 @@ void require_target(const std::string& directory) {
     require_ours(target, target);
 }
 
+/// Takes a folder away with all that is in it. It opens one folder at a time: that no more can be opened may
+/// be why it has to go. @throws std::bad_alloc; Error where it cannot be looked into
+void remove_within(const fs::path& folder) {
+    std::error_code ignored;
+    for (const fs::directory_entry& entry : entries_of(folder))
+        if (not_a(entry, fs::file_type::directory)) fs::remove(entry.path(), ignored);
+        else remove_within(entry.path());
+    fs::remove(folder, ignored);
+}
+
+/// The same as far as it can be done; what stays, the next plan takes away.
+void remove_folder(const fs::path& folder) noexcept {
+    for (int attempt = 0; attempt < 2; ++attempt) try {
+            remove_within(folder);
+            return;
+        } catch (const std::exception&) {  // the memory that it asked for is free again
+        }
+}
+
 /// Between making a folder and having its lock, nobody of this process may look for leftovers.
 std::mutex& making() {
     static std::mutex mutex;
@@ -276,7 +300,7 @@ void remove_leftovers(const fs::path& target) {
         if (!maker || not_a(*at, fs::file_type::directory)) continue;
         struct stat info {};
         if (::lstat(at->path().c_str(), &info) != 0 || info.st_uid != ::geteuid()) continue;
-        if (*maker != ::getpid() && (::kill(static_cast<pid_t>(*maker), 0) == 0 || errno != ESRCH)) continue;
+        if (*maker != ::getpid() && lives(*maker)) continue;
         const int lock = lock_folder(at->path());
         if (lock < 0) continue;
         try {
@@ -317,20 +341,21 @@ OutputFolder::OutputFolder(const std::string& directory) {
 }
 
 OutputFolder::~OutputFolder() {
-    if (!committed_) {
-        std::error_code ignored;
-        fs::remove_all(fresh_, ignored);
-        remove_made_parents();
-    }
     if (lock_ >= 0) ::close(lock_);
+    if (committed_) return;
+    remove_folder(fresh_);
+    remove_made_parents();
 }
 
 void OutputFolder::remove_made_parents() noexcept {
     std::error_code ignored;
     // Only folders that are still empty go: somebody else may have begun to use them.
-    for (fs::path parent = target_.parent_path(); !made_parent_.empty(); parent = parent.parent_path()) {
-        fs::remove(parent, ignored);
-        if (ignored || parent == made_parent_) break;
+    try {
+        for (fs::path parent = target_.parent_path(); !made_parent_.empty(); parent = parent.parent_path()) {
+            fs::remove(parent, ignored);
+            if (ignored || parent == made_parent_) break;
+        }
+    } catch (const std::bad_alloc&) {  // they stay, empty
     }
 }
 
@@ -343,7 +368,6 @@ void OutputFolder::take_place() {
     if (::rename(fresh_.c_str(), target_.c_str()) == 0) return;  // the target did not exist, or was empty
     if (errno != ENOTEMPTY && errno != EEXIST) refuse("out.unwritable", target_, std::strerror(errno));
     require_target(target_.string());  // it may have changed while the plan was made
-    std::error_code ignored;
     // Both change places in one step, so that at every moment one whole plan lies in the target.
     const auto exchange = [&] {
         return ::renameat2(AT_FDCWD, fresh_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) == 0;
@@ -355,7 +379,7 @@ void OutputFolder::take_place() {
             if (exchange()) throw;
             return;  // the new plan has its place, the old folder stays beside it
         }
-        fs::remove_all(fresh_, ignored);
+        remove_folder(fresh_);
         return;
     }
     // File systems without exchange: two renames, the second undone if it fails.
@@ -371,7 +395,7 @@ void OutputFolder::take_place() {
                    fmt::format("what it held lies in {}", old.string()));
         throw;
     }
-    fs::remove_all(old, ignored);
+    remove_folder(old);
 }
 
 }  // namespace slabwright

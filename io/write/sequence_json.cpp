@@ -1,5 +1,6 @@
 #include "io/write/sequence_json.h"
 
+#include <cmath>
 #include <map>
 #include <vector>
 
@@ -106,7 +107,7 @@ std::string sequence_json(const BuildSequence& sequence) {
     json.key("glue").begin_array();
     for (const StatedGlue& g : sequence.glue) {
         json.begin_object().key("layer").integer(g.layer);
-        json.key("z_mm").rounded(g.z, kQuantity);
+        if (!std::isnan(g.z)) json.key("z_mm").rounded(g.z, kQuantity);
         json.key("loops").begin_array();
         for (const auto& loop : g.loops) {
             json.begin_array(Shape::line);

@@ -142,7 +142,8 @@ private:
         double n = 0, t = 0, r = 0, tt = 0, tr = 0;
         const auto each = [&](auto&& take) {
             for (const std::uint32_t f : facets)
-                for (std::uint32_t k = 0; k < 3; ++k) take(wall_.cylinder.place(bends_.corner(f, k)));
+                for (const std::uint32_t corner : {0U, 1U, 2U})
+                    take(wall_.cylinder.place(bends_.corner(f, corner)));
         };
         each([&](const AxisPlace& p) {
             n += 1;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <system_error>
 
 #include "kernels/forces/turn.h"
 #include "kernels/mesh/raw_array.h"
@@ -51,8 +52,12 @@ void SolverAhead::expect(std::span<const CutSegment> cuts) {
     if (static_cast<double>(flats_) * kSecondsFlat + static_cast<double>(balls_) * kSecondsBall <
         worth_seconds_)
         return;
-    opening_ = std::async(std::launch::async,
-                          [this] { return std::make_unique<ForceSolver>(context_, context_.device()); });
+    const auto open = [this] { return std::make_unique<ForceSolver>(context_, context_.device()); };
+    try {
+        opening_ = std::async(std::launch::async, open);
+    } catch (const std::system_error&) {  // there is no thread to be had: it is opened here
+        opening_ = std::async(std::launch::deferred, open);
+    }
 }
 
 ForceSolver* SolverAhead::solver() {

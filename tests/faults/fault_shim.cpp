@@ -1,35 +1,47 @@
 // Makes the system fail as tests ask: loaded into the command by LD_PRELOAD. SLABWRIGHT_FAULT says how:
-//     write 17     the 17th write fails as on a full disk; likewise open (to write), rename, mkdir, sync,
-//     read new 17       the 17th allocation by operator new fails kill 17      the process is killed at the
-//     17th call that changes the disk short        no read or write takes more than 700 bytes interrupted
-//     every second read and write is interrupted by a signal before it does anything clock        clocks jump
-//     a day ahead or back at every look
-// SLABWRIGHT_FAULT_COUNT names a file that is told at the end how often each was called.
+//
+// - "write 17": the 17th write fails as on a full disk. "write 17+": so does every one after it. Likewise
+//   open (to write), rename, mkdir, sync, close (of what was written), read, map (of memory) and new.
+// - "kill 17": the process is killed at the 17th call that changes the disk.
+// - "short": no read or write takes more than 700 bytes.
+// - "interrupted": every second read and write is interrupted by a signal before it does anything.
+// - "clock": clocks jump a day ahead or back at every look.
+//
+// SLABWRIGHT_FAULT_COUNT names a file that is told at the end how often each was called, and
+// SLABWRIGHT_FAULT_SITES one that is told of each way through the code to such a call which call was its
+// first.
 #include <dlfcn.h>
 #include <errno.h>
+#include <execinfo.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdarg.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <mutex>
 #include <new>
 
 namespace {
 
-enum Call { kWrite, kOpen, kRename, kMkdir, kSync, kRead, kNew, kChange, kCalls };
-constexpr const char* kNames[kCalls] = {"write", "open", "rename", "mkdir", "sync", "read", "new", "kill"};
+enum Call { kWrite, kOpen, kRename, kMkdir, kSync, kClose, kRead, kMap, kNew, kChange, kCalls };
+constexpr const char* kNames[kCalls] = {"write", "open", "rename", "mkdir", "sync",
+                                        "close", "read", "map",    "new",   "kill"};
 
 struct Wish {
     int call = -1;
     long at = 0;
+    bool onwards = false;  // all calls from there on
     bool short_ones = false, interrupted = false, clock = false;
 
     Wish() {
@@ -42,7 +54,9 @@ struct Wish {
             const std::size_t length = std::strlen(kNames[c]);
             if (std::strncmp(text, kNames[c], length) != 0 || text[length] != ' ') continue;
             call = c;
-            at = std::strtol(text + length, nullptr, 10);
+            char* end = nullptr;
+            at = std::strtol(text + length, &end, 10);
+            onwards = *end == '+';
         }
     }
 };
@@ -63,8 +77,53 @@ const Wish& wish() {
     return wish;
 }
 
-/// Whether this call is the one that fails.
-bool fails(Call call) { return in_main && ++counts[call] == wish().at && wish().call == call; }
+/// The ways through the code by which calls were made, each with the number of its first call.
+class Sites {
+public:
+    void add(Call call, long number) {
+        void* frames[kDepth];
+        const int depth = ::backtrace(frames, kDepth);
+        std::uint64_t hash = 1469598103934665603u ^ static_cast<std::uint64_t>(call);
+        for (int i = 0; i < depth; ++i)
+            hash = (hash ^ reinterpret_cast<std::uintptr_t>(frames[i])) * 1099511628211u;
+        const std::lock_guard<std::mutex> lock(mutex_);
+        for (std::size_t at = hash % kRoom;; at = (at + 1) % kRoom) {
+            if (sites_[at].number == 0 && ++used_ < kRoom) sites_[at] = {hash, number, call};
+            if (sites_[at].number == 0 || sites_[at].hash == hash) return;
+        }
+    }
+    void tell(const char* path) const {
+        std::FILE* file = std::fopen(path, "w");
+        if (file == nullptr) return;
+        for (const Site& site : sites_)
+            if (site.number != 0) std::fprintf(file, "%s %ld\n", kNames[site.call], site.number);
+        std::fclose(file);
+    }
+
+private:
+    struct Site {
+        std::uint64_t hash;
+        long number;
+        Call call;
+    };
+    static constexpr int kDepth = 12;
+    static constexpr std::size_t kRoom = 1 << 17;
+
+    std::mutex mutex_;
+    std::size_t used_ = 0;
+    Site sites_[kRoom] = {};
+};
+
+const char* const sites_file = std::getenv("SLABWRIGHT_FAULT_SITES");
+Sites sites;
+
+/// Whether this call is one that fails.
+bool fails(Call call) {
+    if (!in_main) return false;
+    const long number = ++counts[call];
+    if (sites_file != nullptr && *sites_file != '\0') sites.add(call, number);
+    return wish().call == call && (number == wish().at || (wish().onwards && number > wish().at));
+}
 
 void changes_disk() {
     if (fails(kChange)) ::kill(::getpid(), SIGKILL);
@@ -92,6 +151,8 @@ std::size_t taken(std::size_t bytes) { return wish().short_ones ? std::min<std::
 
 struct Teller {
     ~Teller() {
+        in_main = false;
+        if (sites_file != nullptr && *sites_file != '\0') sites.tell(sites_file);
         const char* path = std::getenv("SLABWRIGHT_FAULT_COUNT");
         if (path == nullptr) return;
         long told[kCalls];
@@ -221,6 +282,24 @@ int unlinkat(int folder, const char* path, int flags) {
     static const auto next = real<int (*)(int, const char*, int)>("unlinkat");
     changes_disk();
     return next(folder, path, flags);
+}
+
+int close(int file) {
+    static const auto next = real<int (*)(int)>("close");
+    struct stat there {};
+    const int mode = in_main ? ::fcntl(file, F_GETFL) : -1;
+    const bool written = mode >= 0 && (mode & (O_ACCMODE | O_PATH)) == O_WRONLY &&
+                         ::fstat(file, &there) == 0 && S_ISREG(there.st_mode);
+    const bool refuses = written && refused(kClose, EIO);
+    const int answer = next(file);  // the system lets go of a file even where that fails
+    if (refuses) errno = EIO;
+    return refuses ? -1 : answer;
+}
+
+// jemalloc maps before anything can be looked up by name.
+void* mmap(void* at, size_t bytes, int rights, int flags, int file, off_t offset) {
+    if (refused(kMap, ENOMEM)) return MAP_FAILED;
+    return reinterpret_cast<void*>(::syscall(SYS_mmap, at, bytes, rights, flags, file, offset));
 }
 
 int fsync(int file) {

@@ -23,6 +23,7 @@ inline Operation operation(OperationKind kind, int tool, double low, double high
 inline void set_glue(Layer& layer, std::int32_t width, std::int32_t depth) {
     for (int k = 0; k < layer.slabs; ++k, width += 20'000) {
         Joint& joint = layer.joints.emplace_back();
+        joint.z = layer.z_bottom + k * layer.slab_thickness / layer.slabs;
         joint.glue.points = {{0, 0}, {width, 0}, {width, depth}, {0, depth}};
         joint.glue.close_loop();
         joint.area_mm2 = to_mm(width) * to_mm(depth);

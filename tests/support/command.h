@@ -26,14 +26,14 @@ struct CommandResult {
     int signal = 0;  ///< that signal
     std::string out, err;
     double seconds = 0;            ///< from start to end
-    double after_interrupt = 0;    ///< from SIGINT to the end; 0 when it had ended before
+    double after_interrupt = 0;    ///< from the signal that was sent to the end; 0 when it had ended before
     std::uint64_t peak_bytes = 0;  ///< of memory, mapped files too
 };
 
-/// @param interrupt_after seconds until SIGINT is sent; negative: never
+/// @param interrupt_after seconds until `interrupt_by` is sent; negative: never
 inline CommandResult run_command(const std::vector<std::string>& arguments,
                                  const std::vector<std::pair<std::string, std::string>>& environment = {},
-                                 double interrupt_after = -1) {
+                                 double interrupt_after = -1, int interrupt_by = SIGINT) {
     using Clock = std::chrono::steady_clock;
     const TemporaryFolder temporary;
     const std::string out_name = temporary / "out", err_name = temporary / "err";
@@ -66,7 +66,7 @@ inline CommandResult run_command(const std::vector<std::string>& arguments,
         if (interrupt_after >= 0 && !interrupted && since(begin) >= interrupt_after) {
             interrupted = true;
             interrupt = Clock::now();
-            ::kill(child, SIGINT);
+            ::kill(child, interrupt_by);
         }
         ::usleep(2000);
     }
