@@ -337,6 +337,11 @@ void validate(const Job& job) {
     require("tolerances.weld", t.weld, 0, 100);
 
     const LayerPlanning& l = job.layers;
+    if (l.sides != SlabSides::one && job.dowels.per_joint == 0)
+        refuse("layers.sides",
+               "slabs that are milled on both sides and turned are brought to their place by dowels, and "
+               "dowels.per_joint is 0",
+               "give dowels.per_joint = 2, or layers.sides = \"one\"");
     require("layers.min_layer", l.min_layer, 0, 1000);
     require("layers.alpha", l.alpha, 0, 1e6);
     require("layers.beta", l.beta, 0, 1e6);

@@ -26,13 +26,21 @@ struct VerifyOptions {
     bool faults = false;  ///< list every faulty motion in the report (SimulationOptions::faults)
 };
 
+/// What was found about a slab's underside.
+struct UndersideFindings {
+    int layer = 0;       ///< Layer::index
+    std::string folder;  ///< within OUT
+    SimulationReport report;
+};
+
 /// What was found, and what was read to find it.
 struct Verification {
     std::shared_ptr<Pattern> pattern;  ///< with its part
     SimulationInput input;             ///< its mesh is not set: pattern has it
     SimulationReport report;
-    std::vector<MissingTool> missing;  ///< tools that would reach what is out of reach
-    std::string json;                  ///< what verify.json holds (schema slabwright.verify/1)
+    std::vector<UndersideFindings> undersides;  ///< their violations stand in `report` too
+    std::vector<MissingTool> missing;           ///< tools that would reach what is out of reach
+    std::string json;                           ///< what verify.json holds (schema slabwright.verify/1)
 };
 
 /// Reads plan.json, every program of nc/, for LinuxCNC tool.tbl, sequence.json and, if it is not given, the

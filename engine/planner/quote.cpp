@@ -169,6 +169,9 @@ double changes_of(const Machine& machine) {
 }  // namespace
 
 Quote quote(Context& context, MeshView mesh, const Job& job) {
+    if (job.layers.sides != SlabSides::one)
+        throw refusal("quote.sides", "slabs milled on both sides cannot be quoted yet", "layers.sides",
+                      "plan the pattern, or quote it with layers.sides = \"one\"");
     Plan plan;
     plan.job = job;
     const Box3 box = bounds(context, mesh);

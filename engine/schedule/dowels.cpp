@@ -423,6 +423,10 @@ std::span<const JointDowel> dowels_under(const Plan& plan, const Layer& layer) {
 std::vector<UndersideHole> underside_holes(const Plan& plan) {
     std::vector<UndersideHole> holes;
     for (const Layer& layer : plan.layers) {
+        const bool by_program =
+            std::any_of(plan.undersides.begin(), plan.undersides.end(),
+                        [&](const Plan& under) { return under.turned->layer == layer.index; });
+        if (by_program) continue;
         const Blank slab = slab_of(plan, layer);
         int number = 0;
         for (const JointDowel& d : dowels_under(plan, layer))

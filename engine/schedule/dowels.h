@@ -55,7 +55,7 @@ struct UndersideHole {
     friend bool operator==(const UndersideHole&, const UndersideHole&) = default;
 };
 
-/// Of all layers, upwards, in the order of their dowels.
+/// Of all layers whose undersides no program mills, upwards, in the order of their dowels.
 [[nodiscard]] std::vector<UndersideHole> underside_holes(const Plan& plan);
 
 /// Fills Layer::dowels: for each joint between two layers `per_joint` dowels around which, for a radius and

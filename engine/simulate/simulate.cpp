@@ -174,13 +174,13 @@ private:
         const Box3 box = part_.box();
         const double tolerance = 10 * StandingPart::kSheet;
         const double over = box.max.z - input_.layers.back().z_top;
-        if (over > tolerance)
+        if (over > tolerance && options_.whole)
             violate(report, "stack.short",
                     fmt::format("the layers end {:.3f} mm below the pattern's top", over), nullptr, 0,
                     Point3{box.max.x, box.max.y, box.max.z}, over);
         const double beyond = std::max({input_.stock_min[0] - box.min.x, input_.stock_min[1] - box.min.y,
                                         box.max.x - input_.stock_max[0], box.max.y - input_.stock_max[1]});
-        if (beyond > tolerance)
+        if (beyond > tolerance && options_.whole)
             violate(report, "stack.narrow",
                     fmt::format("the pattern reaches {:.3f} mm past the slabs", beyond), nullptr, 0, {},
                     beyond);

@@ -22,6 +22,8 @@ inline constexpr Word<LayerStrategy> kStrategyWords[] = {{"printed", LayerStrate
                                                          {"uniform", LayerStrategy::uniform}};
 inline constexpr Word<SupportRule> kSupportWords[] = {{"none", SupportRule::none},
                                                       {"auto", SupportRule::automatic}};
+inline constexpr Word<SlabSides> kSidesWords[] = {
+    {"one", SlabSides::one}, {"two", SlabSides::two}, {"auto", SlabSides::automatic}};
 inline constexpr Word<Finder> kFinderWords[] = {
     {"halving", Finder::halving}, {"exact", Finder::exact}, {"both", Finder::both}};
 inline constexpr Word<FinishStrategy> kFinishWords[] = {{"split", FinishStrategy::split},
@@ -411,6 +413,10 @@ void visit_plain_job_keys(JobLike& job, Visit& visit) {
     visit.word("strategy", job.layers.strategy, kStrategyWords,
                "optimal, printed (LUO 4.2.5), combined: slabs bonded to any thickness, whatever is built "
                "fastest (LUO 6.4.2), or uniform: as thick as they may be, for comparing");
+    if (shows(visit, job.layers.sides != SlabSides::one))
+        visit.word("sides", job.layers.sides, kSidesWords,
+                   "of slabs that are milled: one, the top; two, where there are overhangs the underside too, "
+                   "before the slab is turned and laid; or auto, two where that makes more");
     visit.word(
         "supports", job.layers.supports, kSupportWords,
         "auto: columns of stock stay under what nothing of the pattern carries, to be sawn off; or none");

@@ -76,4 +76,15 @@ struct UnmadeAir {
 [[nodiscard]] UnmadeAir unmade_air(Context& context, const AirGaps& gaps, std::span<const double> layer_tops,
                                    MilledFrom milled);
 
+/// A layer as it is milled.
+struct MilledLayer {
+    double top = 0;  ///< mm
+    MilledFrom milled = MilledFrom::above;
+    double web = 0;  ///< mm under its top that are not milled from below
+};
+
+/// The same of layers that are not milled alike. Where a layer is milled on both sides, that air too stays
+/// that has solid of the layer above it and lies in its web.
+[[nodiscard]] UnmadeAir unmade_air(Context& context, const AirGaps& gaps, std::span<const MilledLayer> layers);
+
 }  // namespace slabwright

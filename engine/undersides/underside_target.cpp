@@ -1,0 +1,215 @@
+#include "engine/undersides/underside_target.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "engine/schedule/fit.h"
+#include "engine/schedule/joints.h"
+#include "kernels/mesh/facet_roles.h"
+#include "kernels/mesh/weld.h"
+#include "kernels/repair/triangulate.h"
+#include "kernels/slicing/silhouette.h"
+#include "kernels/slicing/slicing.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kLeads = 2;     // mm of room for leads
+constexpr double kSliver = 0.1;  // mm: air less wide is none
+constexpr double kSlit = 1;      // mm: wood less wide between two regions goes with them
+constexpr double kFine = 0.05;   // mm by which the region's outline may be off
+constexpr double kRim = 2;       // mm of wood at the slab's edges that stay
+constexpr double kUnder = 1;     // mm: the tray reaches below all else by that
+
+Loops rectangle(const Blank& blank, double inset) {
+    Loops loops;
+    const std::int32_t x0 = to_units(blank.min[0] + inset), x1 = to_units(blank.max[0] - inset),
+                       y0 = to_units(blank.min[1] + inset), y1 = to_units(blank.max[1] - inset);
+    loops.points = {{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}};
+    loops.close_loop();
+    return loops;
+}
+
+/// The tray of a slab: a rectangle with a recess, as a closed mesh.
+class Tray {
+public:
+    /// @param region of the recess, in the turned slab's frame, nested
+    Tray(const TurnedSlab& slab, const Loops& region, double bottom)
+        : region_(region),
+          bottom_(bottom),
+          floor_(slab.slab_thickness - (slab.z_top - slab.z_bottom) + slab.web),
+          top_(slab.slab_thickness),
+          length_(slab.blank.length()),
+          width_(slab.blank.width()) {}
+
+    Mesh make(Context& context) {
+        for (const double z : {floor_, top_})
+            for (const Point2 p : region_.points) add(to_mm(p.x), to_mm(p.y), z);
+        corners_ = static_cast<std::uint32_t>(points_.size());
+        for (const double z : {bottom_, top_})
+            for (const auto& [x, y] :
+                 {std::array{0.0, 0.0}, {length_, 0.0}, {length_, width_}, {0.0, width_}})
+                add(x, y, z);
+        fill_levels();
+        walls();
+        mesh_.vertices.assign(points_.begin(), points_.end());
+        pair_edges(context, mesh_);
+        return std::move(mesh_);
+    }
+
+private:
+    using Ring = std::vector<std::uint32_t>;
+
+    void add(double x, double y, double z) {
+        points_.push_back({static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)});
+        exact_.push_back({x, y, z});
+    }
+
+    /// A loop of the region at one of its two heights.
+    [[nodiscard]] Ring ring(std::size_t loop, bool at_top, bool reversed) const {
+        Ring ring;
+        const auto shift = static_cast<std::uint32_t>(at_top ? region_.points.size() : 0);
+        for (std::uint32_t i = region_.starts[loop]; i < region_.starts[loop + 1]; ++i)
+            ring.push_back(i + shift);
+        if (reversed) std::reverse(ring.begin(), ring.end());
+        return ring;
+    }
+
+    void fill(const std::vector<Ring>& rings) {
+        const auto triangles = clip_ears(exact_, rings, {0, 0, 1});
+        mesh_.facets.insert(mesh_.facets.end(), triangles.begin(), triangles.end());
+        if (triangles.empty())
+            throw refusal("underside.outline", "the outline of what is milled from below crosses itself", "",
+                          "mill this pattern's slabs from above: layers.sides = \"one\"");
+    }
+
+    [[nodiscard]] std::vector<std::size_t> children(std::int32_t parent) const {
+        std::vector<std::size_t> found;
+        for (std::size_t i = 0; i < region_.size(); ++i)
+            if (region_.parents[i] == parent) found.push_back(i);
+        return found;
+    }
+
+    /// The recess's floor, the rim, and the islands in the recess, which are as high as the rim.
+    void fill_levels() {
+        std::vector<Ring> rim{{corners_ + 4, corners_ + 5, corners_ + 6, corners_ + 7}};
+        for (const std::size_t outer : children(-1)) rim.push_back(ring(outer, true, true));
+        fill(rim);
+        for (std::size_t i = 0; i < region_.size(); ++i) {
+            const bool is_outer = signed_area(region_.loop(i)) > 0;
+            std::vector<Ring> rings{ring(i, !is_outer, !is_outer)};
+            for (const std::size_t inner : children(static_cast<std::int32_t>(i)))
+                rings.push_back(ring(inner, !is_outer, !is_outer));
+            fill(rings);
+        }
+    }
+
+    void quad(std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
+        mesh_.facets.push_back({a, b, c});
+        mesh_.facets.push_back({a, c, d});
+    }
+
+    void walls() {
+        const auto up = static_cast<std::uint32_t>(region_.points.size());
+        for (std::size_t l = 0; l < region_.size(); ++l)
+            for (std::uint32_t i = region_.starts[l]; i < region_.starts[l + 1]; ++i) {
+                const std::uint32_t next = i + 1 < region_.starts[l + 1] ? i + 1 : region_.starts[l];
+                quad(next, i, i + up, next + up);
+            }
+        for (std::uint32_t k = 0; k < 4; ++k) {
+            const std::uint32_t a = corners_ + k, b = corners_ + (k + 1) % 4;
+            quad(a, b, b + 4, a + 4);
+        }
+        quad(corners_ + 3, corners_ + 2, corners_ + 1, corners_);
+    }
+
+    const Loops& region_;
+    double bottom_, floor_, top_, length_, width_;
+    std::vector<Vec3f> points_;
+    std::vector<Xyz> exact_;
+    std::uint32_t corners_ = 0;
+    Mesh mesh_;
+};
+
+/// A region of the pattern's frame in the turned slab's.
+Loops turned(const Loops& region, const TurnedSlab& slab) {
+    Loops loops;
+    const std::int32_t right = to_units(slab.blank.max[0]), front = to_units(slab.blank.min[1]);
+    for (std::size_t l = 0; l < region.size(); ++l) {
+        const auto loop = region.loop(l);
+        for (auto p = loop.rbegin(); p != loop.rend(); ++p)
+            loops.points.push_back({right - p->x, p->y - front});
+        loops.close_loop();
+    }
+    nest(loops);
+    return loops;
+}
+
+}  // namespace
+
+double underside_room(const Job& job) {
+    double widest = 0;
+    for (const Tool& tool : job.tools)
+        if (is_end_mill(tool.kind)) widest = std::max(widest, tool.diameter);
+    return widest + 2 * job.cutting.wall_allowance + kLeads;
+}
+
+Loops underside_region(Context& context, MeshView pattern, const TurnedSlab& slab) {
+    const HeightRange range{slab.z_bottom + kBesideJoint, slab.z_top - kBesideJoint};
+    const Loops shadow = shadows(context, pattern, {&range, 1}).front();
+    const Plane plane{range.low, Side::above};
+    const std::vector<Section> below = slice(context, pattern, {&plane, 1});
+    const Loops air = offset(subtract(shadow, below.front().loops), -kSliver, kFine / 2);
+    if (air.empty()) return {};
+    const Loops wide = offset(air, kSliver + slab.room + kSlit, kFine);
+    return intersect(offset(wide, -kSlit, kFine), rectangle(slab.blank, kRim));
+}
+
+Mesh underside_target(Context& context, MeshView pattern, const TurnedSlab& slab) {
+    for (const Index3& n : pattern.neighbours)
+        if (std::find(n.begin(), n.end(), kNoFacet) != n.end())
+            throw refusal("underside.open", "the pattern is open at its base, so it has no underside to mill",
+                          fmt::format("layer {}", slab.layer),
+                          "close the pattern, or mill its slabs from above: layers.sides = \"one\"");
+    const Loops region = turned(underside_region(context, pattern, slab), slab);
+    if (region.empty())
+        throw refusal("underside.none", "has an underside of which nothing is to be milled",
+                      fmt::format("layer {}", slab.layer), "plan again");
+    Mesh target;
+    float lowest = 0;
+    for (const Vec3f& v : pattern.vertices) {
+        target.vertices.push_back({static_cast<float>(slab.blank.max[0] - v.x),
+                                   static_cast<float>(v.y - slab.blank.min[1]),
+                                   static_cast<float>(slab.z_bottom + slab.slab_thickness - v.z)});
+        lowest = std::min(lowest, target.vertices.back().z);
+    }
+    target.facets.assign(pattern.facets.begin(), pattern.facets.end());
+    target.neighbours.assign(pattern.neighbours.begin(), pattern.neighbours.end());
+    const auto vertex = static_cast<std::uint32_t>(target.vertices.size()),
+               facet = static_cast<std::uint32_t>(target.facets.size());
+    const Mesh tray = Tray(slab, region, lowest - kUnder).make(context);
+    target.vertices.insert(target.vertices.end(), tray.vertices.begin(), tray.vertices.end());
+    for (Index3 f : tray.facets) {
+        for (std::uint32_t& v : f) v += vertex;
+        target.facets.push_back(f);
+    }
+    for (Index3 n : tray.neighbours) {
+        for (std::uint32_t& f : n) f = f == kNoFacet ? f : f + facet;
+        target.neighbours.push_back(n);
+    }
+    target.roles = facet_roles(context, target.view());
+    return target;
+}
+
+std::vector<JointDowel> turned_dowels(const TurnedSlab& slab, std::span<const JointDowel> dowels) {
+    std::vector<JointDowel> turned;
+    for (const JointDowel& d : dowels)
+        turned.push_back({slab.blank.max[0] - d.x, d.y - slab.blank.min[1], d.diameter, d.above, d.below});
+    return turned;
+}
+
+}  // namespace slabwright

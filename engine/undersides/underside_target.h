@@ -1,0 +1,43 @@
+// What a slab's underside is milled to (METHOD.md section 16).
+//
+// Before a slab is laid it lies upside down on a spoil board, and what of the layer's air has solid under the
+// layer's top is milled out from below. The target is a solid like any pattern, in the turned slab's frame
+// (TurnedSlab): the pattern itself, turned, and a tray. The tray's floor is the web that stays under the
+// layer's top, so that nothing comes loose before it is bonded; its rim is all of the slab that lies farther
+// from the milled air than cutters need. Bodies may overlap: the solid is where the winding number is not
+// zero. So an underside is planned and proven as any layer is.
+#pragma once
+
+#include "engine/plan.h"
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+#include "kernels/polygons/loops.h"
+
+namespace slabwright {
+
+/// mm of a slab that stay under its layer's top when its underside is milled.
+inline constexpr double kUndersideWeb = 3;
+
+/// mm around milled air that all end mills of the job need: the widest one, twice what roughing leaves, and
+/// room for leads.
+[[nodiscard]] double underside_room(const Job& job);
+
+/// Where a slab's underside is milled, in the pattern's frame: the air that is open from below and has solid
+/// of the layer above it, seen from above, and the room around it. Empty where there is none.
+/// @param pattern pattern-base, mm, with neighbours
+/// @throws as slice() and shadows()
+[[nodiscard]] Loops underside_region(Context& context, MeshView pattern, const TurnedSlab& slab);
+
+/// The target, with neighbours and roles, in the turned slab's frame.
+/// @param pattern pattern-base, mm, with neighbours
+/// @throws Error(no_plan, "underside.open") for a pattern that is open at its base, Error(no_plan,
+/// "underside.none") where nothing is to be milled, Error(no_plan, "underside.outline") where the region's
+/// outline cannot be filled; as underside_region()
+[[nodiscard]] Mesh underside_target(Context& context, MeshView pattern, const TurnedSlab& slab);
+
+/// Dowels of the joint under a slab as they are drilled into its underside: in the turned slab's frame, as
+/// deep in its top there as they stand in it. @param dowels pattern-base
+[[nodiscard]] std::vector<JointDowel> turned_dowels(const TurnedSlab& slab,
+                                                    std::span<const JointDowel> dowels);
+
+}  // namespace slabwright
