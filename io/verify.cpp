@@ -16,6 +16,7 @@
 #include "engine/simulate/dowel_proof.h"
 #include "engine/simulate/keep_out_check.h"
 #include "engine/simulate/planned_build.h"
+#include "engine/undersides/loose_pieces.h"
 #include "engine/undersides/underside_target.h"
 #include "io/posts/probe_check.h"
 #include "io/posts/program_check.h"
@@ -367,6 +368,8 @@ UndersideFindings prove_underside(Context& context, const PlannedFolder& folder,
     set_heights(build, input.programs);
     check_sequence(path / "sequence.json", build, found);
     const Mesh target = underside_target(context, pattern, slab);
+    if (slab.web < kUndersideWeb && !hangs_together(context, target, slab))
+        found.push_back({"underside.loose", "pieces of the slab come loose before it is laid", "", 0, {}, 0});
     const StandingPart part(context, target.view());
     input.mesh = target.view();
     SimulationOptions simulation = simulation_options(folder.build.job, options, input.tools);
@@ -489,7 +492,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     input.mesh = {};
     result.report.violations.insert(result.report.violations.begin(), violations.begin(), violations.end());
     result.json = verify_json(input, result.report, simulation, fs::path(pattern.place).filename().string(),
-                              folder.build.job_stated, result.missing);
+                              folder.build.job_stated, result.missing, result.undersides);
 
     if (!options.maps_directory.empty()) write_maps(result.report, options.maps_directory);
     if (options.write) write_file_in(out, "verify.json", result.json);

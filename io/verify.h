@@ -8,6 +8,7 @@
 #include "engine/simulate/missing_tools.h"
 #include "engine/simulate/simulate.h"
 #include "io/read/pattern.h"
+#include "io/write/verify_json.h"
 
 namespace slabwright {
 
@@ -24,13 +25,6 @@ struct VerifyOptions {
     SimulationMemory* memory = nullptr;  ///< of the verification before of the same folder (simulate())
     const std::vector<KeepOut>* keep_outs = nullptr;  ///< in place of those that plan.json states
     bool faults = false;  ///< list every faulty motion in the report (SimulationOptions::faults)
-};
-
-/// What was found about a slab's underside.
-struct UndersideFindings {
-    int layer = 0;       ///< Layer::index
-    std::string folder;  ///< within OUT
-    SimulationReport report;
 };
 
 /// What was found, and what was read to find it.

@@ -10,7 +10,6 @@
 
 #include "engine/forces/feeds.h"
 #include "engine/forces/op_forces.h"
-#include "engine/forces/rate_layers.h"
 #include "engine/paths/operations/dowel_holes.h"
 #include "engine/planner/drill_plan.h"
 #include "engine/planner/layer_plan.h"

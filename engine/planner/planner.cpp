@@ -194,7 +194,7 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     std::vector<MilledLayer> milled;
     if (gaps == nullptr) settle_undercuts(context, plan, pattern, origin);
     else {
-        milled = milled_layers(context, plan, *gaps);
+        milled = milled_layers(context, plan, pattern, *gaps);
         settle_unmade(context, plan, *gaps, milled, origin);
     }
     if (plan.job.flask.enabled) plan.flask = place_flask(context, pattern, plan);

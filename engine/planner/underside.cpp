@@ -10,6 +10,7 @@
 #include "engine/schedule/fit.h"
 #include "engine/schedule/heights.h"
 #include "engine/schedule/schedule.h"
+#include "engine/undersides/loose_pieces.h"
 #include "engine/undersides/underside_target.h"
 
 namespace slabwright {
@@ -21,12 +22,6 @@ constexpr double kOverWeb = 1;       // mm that a layer is taller than its web, 
 
 std::string volume_words(double mm3) {
     return mm3 < 1000 ? fmt::format("{:.0f} mm³", std::max(1.0, mm3)) : fmt::format("{:.1f} cm³", mm3 / 1000);
-}
-
-std::vector<double> tops_of(const Plan& plan) {
-    std::vector<double> tops;
-    for (const Layer& layer : plan.layers) tops.push_back(layer.z_top);
-    return tops;
 }
 
 // The job as it is for one slab that lies upside down on a spoil board.
@@ -45,9 +40,9 @@ Job underside_job(const Job& job, double slab_thickness) {
     return own;
 }
 
-TurnedSlab turned_slab(const Plan& plan, const Layer& layer) {
-    return {layer.index,   layer.z_bottom,          layer.z_top, layer.slab_thickness, slab_of(plan, layer),
-            kUndersideWeb, underside_room(plan.job)};
+TurnedSlab turned_slab(const Plan& plan, const Layer& layer, double web) {
+    return {layer.index, layer.z_bottom,          layer.z_top, layer.slab_thickness, slab_of(plan, layer),
+            web,         underside_room(plan.job)};
 }
 
 void check_tools(const Plan& plan, const TurnedSlab& slab) {
@@ -60,9 +55,9 @@ void check_tools(const Plan& plan, const TurnedSlab& slab) {
                   "take thinner slabs or tools with longer flutes, or layers.sides = \"one\"");
 }
 
-Plan plan_underside(Context& context, const Plan& plan, MeshView pattern, const Layer& layer,
+Plan plan_underside(Context& context, const Plan& plan, MeshView pattern, const Layer& layer, double web,
                     ProgressShare share) {
-    const TurnedSlab slab = turned_slab(plan, layer);
+    const TurnedSlab slab = turned_slab(plan, layer, web);
     check_tools(plan, slab);
     const Mesh target = underside_target(context, pattern, slab);
     Plan under;
@@ -119,22 +114,33 @@ LayerPlacement place_two_sided(Context& context, const Job& job, const LayerRequ
     return enough ? from_above : both;
 }
 
-std::vector<MilledLayer> milled_layers(Context& context, const Plan& plan, const AirGaps& gaps) {
-    std::vector<MilledLayer> from_above, both;
-    for (const Layer& layer : plan.layers) {
-        from_above.push_back({layer.z_top, MilledFrom::above, 0});
-        both.push_back({layer.z_top, MilledFrom::both_sides, kUndersideWeb});
-    }
-    const UnmadeAir above = unmade_air(context, gaps, from_above), less = unmade_air(context, gaps, both);
+std::vector<MilledLayer> milled_layers(Context& context, const Plan& plan, MeshView pattern,
+                                       const AirGaps& gaps) {
+    const auto layers_with = [&](double web) {
+        std::vector<MilledLayer> layers;
+        for (const Layer& layer : plan.layers)
+            layers.push_back({layer.z_top, web < 0 ? MilledFrom::above : MilledFrom::both_sides,
+                              std::max(web, film_web(layer.z_top - layer.z_bottom, layer.slab_thickness))});
+        return layers;
+    };
+    const std::vector<MilledLayer> from_above = layers_with(-1), film = layers_with(0),
+                                   thick = layers_with(kUndersideWeb);
+    const UnmadeAir above = unmade_air(context, gaps, from_above), of_film = unmade_air(context, gaps, film),
+                    of_thick = unmade_air(context, gaps, thick);
     std::vector<double> heights(plan.layers.size(), 0);
     for (const UnmadePocket& p : above.pockets) heights[p.layer] = std::max(heights[p.layer], p.height_mm);
     std::vector<MilledLayer> milled = from_above;
     for (std::size_t i = 0; i < milled.size(); ++i) {
         const Layer& layer = plan.layers[i];
-        if (heights[i] > plan.job.tolerances.undercut && layer.slabs == 1 &&
-            above.of_layers[i] - less.of_layers[i] >= kWorthMilling &&
-            layer.z_top - layer.z_bottom > kUndersideWeb + kOverWeb)
-            milled[i] = both[i];
+        if (heights[i] <= plan.job.tolerances.undercut || layer.slabs != 1 ||
+            above.of_layers[i] - of_film.of_layers[i] < kWorthMilling)
+            continue;
+        const TurnedSlab slab = turned_slab(plan, layer, film[i].web);
+        if (underside_region(context, pattern, slab).empty()) continue;
+        if (hangs_together(context, underside_target(context, pattern, slab), slab)) milled[i] = film[i];
+        else if (above.of_layers[i] - of_thick.of_layers[i] >= kWorthMilling &&
+                 layer.z_top - layer.z_bottom > kUndersideWeb + kOverWeb)
+            milled[i] = thick[i];
     }
     return milled;
 }
@@ -187,7 +193,7 @@ void plan_undersides(Context& context, Plan& plan, MeshView pattern, const std::
     for (std::size_t k = 0; k < turned.size(); ++k) {
         const double step = 1.0 / static_cast<double>(turned.size()), at = static_cast<double>(k) * step;
         plan.undersides.push_back(plan_underside(context, plan, pattern, plan.layers[turned[k]],
-                                                 {share.at(at), share.at(at + step)}));
+                                                 milled[turned[k]].web, {share.at(at), share.at(at + step)}));
         for (Diagnostic& told : plan.undersides.back().diagnostics) told.where.reset();
         for (const Diagnostic& told : plan.undersides.back().diagnostics)
             if (told.severity != Severity::note)

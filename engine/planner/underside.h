@@ -27,8 +27,11 @@ void check_two_sided(const Job& job, MeshView pattern);
                                              const AirGaps& gaps, const LayerPlacement& from_above);
 
 /// How each of a plan's layers is milled: on both sides where that makes air higher than tolerances.undercut
-/// and a cubic millimetre at least, and the slab is tall enough for the web.
-[[nodiscard]] std::vector<MilledLayer> milled_layers(Context& context, const Plan& plan, const AirGaps& gaps);
+/// and a cubic millimetre at least. Its web is a film where the slab hangs together without one, and else
+/// kUndersideWeb.
+/// @param pattern with neighbours. @throws as underside_target()
+[[nodiscard]] std::vector<MilledLayer> milled_layers(Context& context, const Plan& plan, MeshView pattern,
+                                                     const AirGaps& gaps);
 
 /// Says what stays filled, and refuses what the job does not accept.
 /// @param origin of the frame that places are told in

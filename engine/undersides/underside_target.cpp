@@ -41,7 +41,7 @@ public:
     Tray(const TurnedSlab& slab, const Loops& region, double bottom)
         : region_(region),
           bottom_(bottom),
-          floor_(slab.slab_thickness - (slab.z_top - slab.z_bottom) + slab.web),
+          floor_(recess_floor(slab)),
           top_(slab.slab_thickness),
           length_(slab.blank.length()),
           width_(slab.blank.width()) {}
@@ -150,6 +150,14 @@ Loops turned(const Loops& region, const TurnedSlab& slab) {
 }
 
 }  // namespace
+
+double film_web(double height, double slab_thickness) {
+    return std::max(0.0, kUndersideFilm - (slab_thickness - height));
+}
+
+double recess_floor(const TurnedSlab& slab) {
+    return slab.slab_thickness - (slab.z_top - slab.z_bottom) + slab.web;
+}
 
 double underside_room(const Job& job) {
     double widest = 0;

@@ -15,8 +15,17 @@
 
 namespace slabwright {
 
-/// mm of a slab that stay under its layer's top when its underside is milled.
+/// mm of a slab that stay under its layer's top when its underside is milled and pieces of it would else come
+/// loose.
 inline constexpr double kUndersideWeb = 3;
+/// mm over the spoil board that always stay; the top side takes them away. What the facing takes is among
+/// them.
+inline constexpr double kUndersideFilm = 0.5;
+
+/// The thinnest web that leaves a film. @param height, slab_thickness of the layer, mm
+[[nodiscard]] double film_web(double height, double slab_thickness);
+/// z of the floor of what is milled, in the turned slab's frame, mm.
+[[nodiscard]] double recess_floor(const TurnedSlab& slab);
 
 /// mm around milled air that all end mills of the job need: the widest one, twice what roughing leaves, and
 /// room for leads.

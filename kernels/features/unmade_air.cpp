@@ -159,7 +159,7 @@ UnmadeAir unmade_air(Context& context, const AirGaps& gaps, std::span<const Mill
     parallel_for(context, rows.size(), kRows, [&](std::size_t begin, std::size_t end) {
         for (std::size_t row = begin; row < end; ++row)
             for (const AirGap& gap : gaps.rows[row])
-                if (Kept kept; is_kept(gap, borders, milled, kept)) rows[row].push_back(kept);
+                if (Kept kept; is_kept(gap, borders, layers, kept)) rows[row].push_back(kept);
     });
     const double area = gaps.grid.cell * gaps.grid.cell;
     std::array<double, 4> quarters{};

@@ -1,0 +1,244 @@
+// Plans of slabs that are milled on both sides: what they make, proven from the text, and what is told where
+// an underside, its place or its turning is not as planned.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "io/slabwright.h"
+#include "io/write/stl_writer.h"
+#include "kernels/mesh/weld.h"
+#include "tests/support/files.h"
+#include "tests/support/schema.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/tunnels.h"
+
+namespace slabwright {
+namespace {
+
+using nlohmann::json;
+using support::slurp;
+using support::spit;
+using support::TemporaryFolder;
+
+/// The default job with slabs milled on both sides, and a drill for dowels of 8 mm.
+Job two_sided() {
+    Job job;
+    job.layers.sides = SlabSides::two;
+    job.dowels.per_joint = 2;
+    Tool drill = job.tools[1];
+    drill.number = 11;
+    drill.kind = ToolKind::drill;
+    drill.name = "drill 8 mm";
+    drill.diameter = drill.shank_diameter = 8;
+    drill.flute_length = 45;
+    drill.stickout = 60;
+    drill.plunge_feed = 600;
+    drill.plunges = true;
+    job.tools.push_back(drill);
+    return job;
+}
+
+/// Planned and written once, for all tests to spoil and put back.
+class TwoSided : public testing::Test {
+protected:
+    static void SetUpTestSuite() {
+        built_ = new Built;
+        Context context;
+        // A block with a tunnel of radius 15 along y.
+        write_stl(built_->stl,
+                  weld(context, support::block_with_tunnels({0, 0, 0}, {100, 70, 36}, {{50, 18, 15}})));
+        const Job job = two_sided();
+        const std::shared_ptr<Pattern> pattern = read_pattern(context, built_->stl, job);
+        Plan made = plan(context, *pattern, job);
+        built_->result = write_proven(context, made, built_->out, pattern, true);
+        built_->plan = json::parse(slurp(built_->out + "/plan.json"));
+        for (const json& layer : built_->plan["layers"])
+            if (layer.contains("underside"))
+                built_->undersides.push_back(built_->out + "/" +
+                                             layer["underside"]["folder"].get<std::string>());
+    }
+    static void TearDownTestSuite() {
+        delete built_;
+        built_ = nullptr;
+    }
+
+    /// What is found when a file holds another text for once.
+    static std::set<std::string> found(const std::string& file, const std::string& text) {
+        const std::string was = slurp(file);
+        spit(file, text);
+        Context context;
+        std::set<std::string> codes;
+        for (const Diagnostic& d : verify(context, built_->out, built_->stl, "", 1).violations)
+            codes.insert(d.code);
+        spit(file, was);
+        return codes;
+    }
+    /// The program of an underside with this purpose or kind.
+    static std::string program(const std::string& underside, const std::string& key,
+                               const std::string& value) {
+        for (const json& op : json::parse(slurp(underside + "/plan.json"))["layers"][0]["operations"])
+            if (op[key] == value) return underside + "/" + op["file"].get<std::string>();
+        return "";
+    }
+
+    struct Built {
+        TemporaryFolder folder;
+        std::string out = folder / "out", stl = folder / "tunnel.stl";
+        VerifyResult result;
+        json plan;
+        std::vector<std::string> undersides;
+    };
+    static Built* built_;
+};
+
+TwoSided::Built* TwoSided::built_ = nullptr;
+
+TEST_F(TwoSided, ATunnelIsMadeWholeAndProvenFromTheText) {
+    for (const Diagnostic& d : built_->result.violations) ADD_FAILURE() << d.code << ": " << d.message;
+    EXPECT_TRUE(built_->result.passed);
+    EXPECT_EQ(built_->undersides.size(), 1U);
+    EXPECT_LT(built_->result.unmade_mm3, 1);
+    const json verified = json::parse(slurp(built_->out + "/verify.json"));
+    ASSERT_EQ(verified["undersides"].size(), 1U);
+    EXPECT_GT(verified["undersides"][0]["removed_mm3"].get<double>(), 0.45 * 3.1416 * 225 * 70);
+}
+
+TEST_F(TwoSided, DocumentsKeepToTheirSchemas) {
+    for (std::string folder : {built_->out, built_->undersides.at(0)}) {
+        for (const std::string name : {"plan", "sequence"})
+            EXPECT_EQ(support::schema_complaint(slurp(folder + "/" + name + ".json"),
+                                                SLABWRIGHT_SOURCE_DIR "/io/" + name + ".schema.json"),
+                      "");
+    }
+}
+
+TEST_F(TwoSided, AnUndersideCutTooDeepIsAGouge) {
+    const std::string file = program(built_->undersides.at(0), "kind", "rough");
+    ASSERT_NE(file, "");
+    // Every height of the program half a millimetre lower.
+    std::string text;
+    std::istringstream lines(slurp(file));
+    for (std::string line; std::getline(lines, line);) {
+        if (const std::size_t z = line.find('Z'); z != std::string::npos && line.front() == 'G') {
+            std::size_t used = 0;
+            const double height = std::stod(line.substr(z + 1), &used);
+            line = line.substr(0, z + 1) + fmt::format("{:.4f}", height - 0.5) + line.substr(z + 1 + used);
+        }
+        text += line + '\n';
+    }
+    const std::set<std::string> codes = found(file, text);
+    EXPECT_TRUE(codes.contains("gouge.cutter")) << fmt::format("{}", fmt::join(codes, " "));
+}
+
+TEST_F(TwoSided, AnUndersideThatIsNotMilledIsFound) {
+    const std::string file = program(built_->undersides.at(0), "kind", "finish");
+    ASSERT_NE(file, "");
+    std::filesystem::rename(file, file + ".away");
+    Context context;
+    std::set<std::string> codes;
+    for (const Diagnostic& d : verify(context, built_->out, built_->stl, "", 1).violations)
+        codes.insert(d.code);
+    std::filesystem::rename(file + ".away", file);
+    EXPECT_TRUE(codes.contains("program.missing"));
+    EXPECT_TRUE(codes.contains("left.missed") || codes.contains("left.too_much"));
+}
+
+TEST_F(TwoSided, ASlabThatIsNotTurnedIsFound) {
+    const std::string file = built_->out + "/sequence.json";
+    for (const char* action : {"turn_over", "mill_underside"}) {
+        json sequence = json::parse(slurp(file));
+        json& steps = sequence["steps"];
+        const auto step =
+            std::find_if(steps.begin(), steps.end(), [&](const json& s) { return s["action"] == action; });
+        ASSERT_NE(step, steps.end());
+        // Those that wait for it wait for what it waits for.
+        const json id = (*step)["id"], before = (*step)["needs"];
+        steps.erase(step);
+        for (json& s : steps) {
+            json needs = json::array();
+            for (const json& need : s["needs"])
+                if (need != id) needs.push_back(need);
+                else needs.insert(needs.end(), before.begin(), before.end());
+            s["needs"] = needs;
+        }
+        const std::set<std::string> codes = found(file, sequence.dump());
+        EXPECT_TRUE(codes.contains("sequence.order")) << action;
+    }
+}
+
+TEST_F(TwoSided, ADowelMirroredTheWrongWayIsFound) {
+    // Turned about x in place of y: in the plan of the underside, and in the program that drills it.
+    const std::string file = built_->undersides.at(0) + "/plan.json";
+    json under = json::parse(slurp(file));
+    json& dowels = under["layers"][0]["dowels"];
+    ASSERT_GE(dowels.size(), 2U);
+    const double width = under["stock"]["max"][1];
+    for (json& d : dowels) d["y"] = width - d["y"].get<double>();
+    EXPECT_TRUE(found(file, under.dump()).contains("dowel.underside"));
+    const std::string holes = program(built_->undersides.at(0), "purpose", "dowel holes");
+    ASSERT_NE(holes, "");
+    std::string text;
+    std::istringstream lines(slurp(holes));
+    for (std::string line; std::getline(lines, line);) {
+        if (const std::size_t y = line.find('Y'); y != std::string::npos && line.front() == 'G') {
+            std::size_t used = 0;
+            const double at = std::stod(line.substr(y + 1), &used);
+            line = line.substr(0, y + 1) + fmt::format("{:.4f}", width - at) + line.substr(y + 1 + used);
+        }
+        text += line + '\n';
+    }
+    const std::set<std::string> codes = found(holes, text);
+    EXPECT_TRUE(codes.contains("dowel.missing") || codes.contains("dowel.place"))
+        << fmt::format("{}", fmt::join(codes, " "));
+}
+
+TEST_F(TwoSided, AnUndersideOfAnotherSlabIsFound) {
+    const std::string file = built_->undersides.at(0) + "/plan.json";
+    json under = json::parse(slurp(file));
+    under["turned"]["z_bottom"] = under["turned"]["z_bottom"].get<double>() + 0.5;
+    EXPECT_TRUE(found(file, under.dump()).contains("underside.slab"));
+}
+
+TEST_F(TwoSided, WhatDoesNotGoWithItIsRefused) {
+    Context context;
+    const auto refused = [&](const std::function<void(Job&)>& change) {
+        Job job = two_sided();
+        change(job);
+        try {
+            (void)plan(context, built_->stl, job);
+        } catch (const Error& error) {
+            return error.code() + (error.remedy().empty() ? " without remedy" : "");
+        }
+        return std::string("planned");
+    };
+    EXPECT_EQ(refused([](Job& job) { job.dowels.per_joint = 0; }), "job.range");
+    EXPECT_EQ(refused([](Job& job) {
+                  job.flask.enabled = true;
+                  job.flask.gap = 30;
+              }),
+              "layers.sides");
+    EXPECT_EQ(refused([](Job& job) { job.layers.strategy = LayerStrategy::combined; }), "layers.sides");
+    EXPECT_EQ(refused([](Job& job) { job.layers.sides = SlabSides::one; }), "undercut.unmade");
+}
+
+TEST_F(TwoSided, AutomaticMillsFromBelowOnlyWhereThatMakesMore) {
+    Context context;
+    Job job = two_sided();
+    job.layers.sides = SlabSides::automatic;
+    EXPECT_EQ(plan(context, built_->stl, job).undersides.size(), 1U);
+    const std::string block = built_->folder / "block.stl";
+    write_stl(block, weld(context, shapes::box({0, 0, 0}, {100, 70, 36})));
+    EXPECT_TRUE(plan(context, block, job).undersides.empty());
+}
+
+}  // namespace
+}  // namespace slabwright
