@@ -18,6 +18,7 @@ namespace slabwright {
 namespace {
 
 constexpr double kWorthMilling = 1;  // mm³
+constexpr double kNoMore = 1.01;     // of what stays filled
 constexpr double kOverWeb = 1;       // mm that a layer is taller than its web, to be worth turning
 
 std::string volume_words(double mm3) {
@@ -100,17 +101,28 @@ void check_two_sided(const Job& job, MeshView pattern) {
 
 LayerPlacement place_two_sided(Context& context, const Job& job, const LayerRequest& request,
                                const AirGaps& gaps, const LayerPlacement& from_above) {
-    LayerPlacement both =
-        place_layers_both_sides(request, gaps, {.filled_gap = job.tolerances.undercut, .step_mm3 = 0});
-    if (job.layers.sides == SlabSides::two) return both;
-    const auto tops = [](const LayerPlacement& placement) {
-        std::vector<double> heights;
-        for (const Boundary& b : placement.boundaries) heights.push_back(b.z);
-        return heights;
+    const auto place = [&](double min_layer) {
+        LayerRequest asked = request;
+        asked.min_layer = std::max(asked.min_layer, min_layer);
+        return place_layers_both_sides(asked, gaps, {.filled_gap = job.tolerances.undercut, .step_mm3 = 0});
     };
-    const UnmadeAir above = unmade_air(context, gaps, tops(from_above), MilledFrom::above);
-    const UnmadeAir less = unmade_air(context, gaps, tops(both), MilledFrom::both_sides);
-    const bool enough = above.height_mm <= job.tolerances.undercut || above.volume_mm3 <= less.volume_mm3;
+    const auto left_by = [&](const LayerPlacement& placement, MilledFrom milled) {
+        std::vector<double> tops;
+        for (const Boundary& b : placement.boundaries) tops.push_back(b.z);
+        return unmade_air(context, gaps, tops, milled);
+    };
+    LayerPlacement both = place(0);
+    UnmadeAir left = left_by(both, MilledFrom::both_sides);
+    // Layers with room for dowels, where they leave no more.
+    LayerPlacement dowelled = place(least_layer_for_dowels(job.dowels));
+    if (const UnmadeAir same = left_by(dowelled, MilledFrom::both_sides);
+        same.volume_mm3 <= kNoMore * left.volume_mm3 + kWorthMilling) {
+        both = std::move(dowelled);
+        left = same;
+    }
+    if (job.layers.sides == SlabSides::two) return both;
+    const UnmadeAir above = left_by(from_above, MilledFrom::above);
+    const bool enough = above.height_mm <= job.tolerances.undercut || above.volume_mm3 <= left.volume_mm3;
     return enough ? from_above : both;
 }
 

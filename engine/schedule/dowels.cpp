@@ -378,6 +378,10 @@ double dowel_depth(const JointDowels& rules, double layer_mm) {
     return depth < rules.diameter / 2 ? 0 : depth;
 }
 
+double least_layer_for_dowels(const JointDowels& rules) {
+    return std::ceil(rules.diameter / 2 * 10) / 10 + kLeastWoodAtDowel + point_mm(rules.diameter);
+}
+
 std::array<double, 2> wood_around(const JointDowel& dowel, double z) {
     const double beyond = point_mm(dowel.diameter) + kLeastWoodAtDowel - kBesideEnds;
     return {z - dowel.below - beyond, z + dowel.above + beyond};

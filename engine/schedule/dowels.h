@@ -24,6 +24,9 @@ inline constexpr double kLeastWoodAtDowel = 3;
 /// the layer leaves room for; 0 where that is less than half a diameter.
 [[nodiscard]] double dowel_depth(const JointDowels& rules, double layer_mm);
 
+/// The lowest layer that has room for a hole of half a diameter, mm.
+[[nodiscard]] double least_layer_for_dowels(const JointDowels& rules);
+
 /// The heights between which the wood around a dowel is looked at: its holes, the drill's points, and
 /// kLeastWoodAtDowel beyond these. @param z of the joint, mm
 [[nodiscard]] std::array<double, 2> wood_around(const JointDowel& dowel, double z);

@@ -23,6 +23,7 @@ constexpr double kSliver = 0.1;  // mm: air less wide is none
 constexpr double kSlit = 1;      // mm: wood less wide between two regions goes with them
 constexpr double kFine = 0.05;   // mm by which the region's outline may be off
 constexpr double kRim = 2;       // mm of wood at the slab's edges that stay
+constexpr double kBeyond = 200;  // mm: the rim reaches past the slab, so that nothing is cut beside it
 constexpr double kUnder = 1;     // mm: the tray reaches below all else by that
 
 Loops rectangle(const Blank& blank, double inset) {
@@ -51,8 +52,10 @@ public:
             for (const Point2 p : region_.points) add(to_mm(p.x), to_mm(p.y), z);
         corners_ = static_cast<std::uint32_t>(points_.size());
         for (const double z : {bottom_, top_})
-            for (const auto& [x, y] :
-                 {std::array{0.0, 0.0}, {length_, 0.0}, {length_, width_}, {0.0, width_}})
+            for (const auto& [x, y] : {std::array{-kBeyond, -kBeyond},
+                                       {length_ + kBeyond, -kBeyond},
+                                       {length_ + kBeyond, width_ + kBeyond},
+                                       {-kBeyond, width_ + kBeyond}})
                 add(x, y, z);
         fill_levels();
         walls();
