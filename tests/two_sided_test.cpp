@@ -85,7 +85,8 @@ protected:
     /// The program of an underside with this purpose or kind.
     static std::string program(const std::string& underside, const std::string& key,
                                const std::string& value) {
-        for (const json& op : json::parse(slurp(underside + "/plan.json"))["layers"][0]["operations"])
+        const json under = json::parse(slurp(underside + "/plan.json"));
+        for (const json& op : under["layers"][0]["operations"])
             if (op[key] == value) return underside + "/" + op["file"].get<std::string>();
         return "";
     }
@@ -128,7 +129,7 @@ TEST_F(TwoSided, AnUndersideCutTooDeepIsAGouge) {
     std::string text;
     std::istringstream lines(slurp(file));
     for (std::string line; std::getline(lines, line);) {
-        if (const std::size_t z = line.find('Z'); z != std::string::npos && line.front() == 'G') {
+        if (const std::size_t z = line.find('Z'); z != std::string::npos && line.front() != '(') {
             std::size_t used = 0;
             const double height = std::stod(line.substr(z + 1), &used);
             line = line.substr(0, z + 1) + fmt::format("{:.4f}", height - 0.5) + line.substr(z + 1 + used);
@@ -140,7 +141,7 @@ TEST_F(TwoSided, AnUndersideCutTooDeepIsAGouge) {
 }
 
 TEST_F(TwoSided, AnUndersideThatIsNotMilledIsFound) {
-    const std::string file = program(built_->undersides.at(0), "kind", "finish");
+    const std::string file = program(built_->undersides.at(0), "purpose", "level contours");
     ASSERT_NE(file, "");
     std::filesystem::rename(file, file + ".away");
     Context context;
@@ -189,7 +190,7 @@ TEST_F(TwoSided, ADowelMirroredTheWrongWayIsFound) {
     std::string text;
     std::istringstream lines(slurp(holes));
     for (std::string line; std::getline(lines, line);) {
-        if (const std::size_t y = line.find('Y'); y != std::string::npos && line.front() == 'G') {
+        if (const std::size_t y = line.find('Y'); y != std::string::npos && line.front() != '(') {
             std::size_t used = 0;
             const double at = std::stod(line.substr(y + 1), &used);
             line = line.substr(0, y + 1) + fmt::format("{:.4f}", width - at) + line.substr(y + 1 + used);
