@@ -354,7 +354,7 @@ UndersideFindings prove_underside(Context& context, const PlannedFolder& folder,
     if (!under.turned)
         throw Error(ErrorKind::verification, refusal.plan, "is no plan of a slab's underside",
                     (path / "plan.json").string(), "plan again");
-    UndersideFindings result{planned.layer, planned.folder, {}};
+    UndersideFindings result{planned.layer, planned.folder, {}, {}};
     std::vector<Violation> found;
     const TurnedSlab slab = slab_of(folder.build, layer, *under.turned);
     check_turned(under, slab,
@@ -379,6 +379,8 @@ UndersideFindings prove_underside(Context& context, const PlannedFolder& folder,
     const std::vector<Violation> dowels = check_dowels(context, input, part, -1);
     found.insert(found.end(), dowels.begin(), dowels.end());
     found.insert(found.end(), result.report.violations.begin(), result.report.violations.end());
+    result.report.violations = found;
+    result.programs = std::move(input.programs);
     for (Violation& v : found) {
         v.file = v.file.empty() ? planned.folder : planned.folder + "/" + v.file;
         if (v.where)

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "engine/schedule/fit.h"
@@ -18,13 +21,19 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kLeads = 2;     // mm of room for leads
-constexpr double kSliver = 0.1;  // mm: air less wide is none
-constexpr double kSlit = 1;      // mm: wood less wide between two regions goes with them
-constexpr double kFine = 0.05;   // mm by which the region's outline may be off
-constexpr double kRim = 2;       // mm of wood at the slab's edges that stay
-constexpr double kBeyond = 200;  // mm: the rim reaches past the slab, so that nothing is cut beside it
-constexpr double kUnder = 1;     // mm: the tray reaches below all else by that
+constexpr double kLeads = 2;        // mm of room for leads
+constexpr double kSliver = 0.1;     // mm: air less wide is none
+constexpr double kSlit = 1;         // mm: wood less wide between two regions goes with them
+constexpr double kFine = 0.05;      // mm by which the region's outline may be off
+constexpr double kStraight = 0.01;  // mm from the line between its neighbours: a point less far off goes
+constexpr double kSpeck = 1;        // mm²: a loop less large goes
+constexpr int kDirections = 8;      // from which a region is tried to be filled
+constexpr double kTurn = 0.7;       // radians between them
+constexpr int kOutlines = 4;        // regions that are tried, each a little wider, until one can be filled
+constexpr double kWider = 0.37;     // mm
+constexpr double kRim = 2;          // mm of wood at the slab's edges that stay
+constexpr double kBeyond = 200;     // mm: the rim reaches past the slab, so that nothing is cut beside it
+constexpr double kUnder = 1;        // mm: the tray reaches below all else by that
 
 Loops rectangle(const Blank& blank, double inset) {
     Loops loops;
@@ -39,15 +48,16 @@ Loops rectangle(const Blank& blank, double inset) {
 class Tray {
 public:
     /// @param region of the recess, in the turned slab's frame, nested
-    Tray(const TurnedSlab& slab, const Loops& region, double bottom)
-        : region_(region),
+    Tray(const TurnedSlab& slab, Loops region, double bottom)
+        : region_(std::move(region)),
           bottom_(bottom),
           floor_(recess_floor(slab)),
           top_(slab.slab_thickness),
           length_(slab.blank.length()),
           width_(slab.blank.width()) {}
 
-    Mesh make(Context& context) {
+    /// None where the region's outline cannot be filled with triangles.
+    std::optional<Mesh> make(Context& context) {
         for (const double z : {floor_, top_})
             for (const Point2 p : region_.points) add(to_mm(p.x), to_mm(p.y), z);
         corners_ = static_cast<std::uint32_t>(points_.size());
@@ -58,6 +68,7 @@ public:
                                        {-kBeyond, width_ + kBeyond}})
                 add(x, y, z);
         fill_levels();
+        if (!filled_) return std::nullopt;
         walls();
         mesh_.vertices.assign(points_.begin(), points_.end());
         pair_edges(context, mesh_);
@@ -82,12 +93,18 @@ private:
         return ring;
     }
 
+    /// Bridges to holes may miss where corners lie level; seen from another direction they do not.
     void fill(const std::vector<Ring>& rings) {
-        const auto triangles = clip_ears(exact_, rings, {0, 0, 1});
-        mesh_.facets.insert(mesh_.facets.end(), triangles.begin(), triangles.end());
-        if (triangles.empty())
-            throw refusal("underside.outline", "the outline of what is milled from below crosses itself", "",
-                          "mill this pattern's slabs from above: layers.sides = \"one\"");
+        for (int k = 0; k < kDirections; ++k) {
+            const double turn = k * kTurn, cosine = std::cos(turn), sine = std::sin(turn);
+            std::vector<Xyz> points = exact_;
+            for (Xyz& p : points) p = {cosine * p[0] - sine * p[1], sine * p[0] + cosine * p[1], p[2]};
+            const auto triangles = clip_ears(points, rings, {0, 0, 1});
+            if (triangles.empty()) continue;
+            mesh_.facets.insert(mesh_.facets.end(), triangles.begin(), triangles.end());
+            return;
+        }
+        filled_ = false;
     }
 
     [[nodiscard]] std::vector<std::size_t> children(std::int32_t parent) const {
@@ -130,13 +147,41 @@ private:
         quad(corners_ + 3, corners_ + 2, corners_ + 1, corners_);
     }
 
-    const Loops& region_;
+    const Loops region_;
     double bottom_, floor_, top_, length_, width_;
     std::vector<Vec3f> points_;
     std::vector<Xyz> exact_;
     std::uint32_t corners_ = 0;
+    bool filled_ = true;
     Mesh mesh_;
 };
+
+/// How far a point lies from the line through two others, mm; from the first where they are one.
+double off_line(Point2 p, Point2 a, Point2 b) {
+    const double dx = double{1} * b.x - a.x, dy = double{1} * b.y - a.y, px = double{1} * p.x - a.x,
+                 py = double{1} * p.y - a.y;
+    const double length = std::hypot(dx, dy);
+    return (length > 0 ? std::abs(dx * py - dy * px) / length : std::hypot(px, py)) / kUnitsPerMm;
+}
+
+/// Loops without points that lie on the line between their neighbours, and without those too small to matter.
+Loops without_straight_points(const Loops& region) {
+    Loops kept;
+    for (std::size_t l = 0; l < region.size(); ++l) {
+        std::vector<Point2> points;
+        for (const Point2 p : region.loop(l)) {
+            while (points.size() > 1 && off_line(points.back(), points[points.size() - 2], p) < kStraight)
+                points.pop_back();
+            points.push_back(p);
+        }
+        while (points.size() > 2 && off_line(points.back(), points[points.size() - 2], points[0]) < kStraight)
+            points.pop_back();
+        if (points.size() < 3 || std::abs(signed_area(points)) < kSpeck) continue;
+        kept.points.insert(kept.points.end(), points.begin(), points.end());
+        kept.close_loop();
+    }
+    return kept;
+}
 
 /// A region of the pattern's frame in the turned slab's.
 Loops turned(const Loops& region, const TurnedSlab& slab) {
@@ -150,6 +195,19 @@ Loops turned(const Loops& region, const TurnedSlab& slab) {
     }
     nest(loops);
     return loops;
+}
+
+/// @param region in the pattern's frame
+Mesh tray_of(Context& context, const Loops& region, const TurnedSlab& slab, double bottom) {
+    for (int k = 0; k < kOutlines; ++k) {
+        const Loops wider =
+            k == 0 ? region : intersect(offset(region, k * kWider, kFine), rectangle(slab.blank, kRim));
+        if (auto tray = Tray(slab, turned(without_straight_points(wider), slab), bottom).make(context))
+            return std::move(*tray);
+    }
+    throw refusal("underside.outline", "the outline of what is milled from below cannot be filled",
+                  fmt::format("layer {}", slab.layer),
+                  "mill this pattern's slabs from above: layers.sides = \"one\"");
 }
 
 }  // namespace
@@ -186,7 +244,7 @@ Mesh underside_target(Context& context, MeshView pattern, const TurnedSlab& slab
             throw refusal("underside.open", "the pattern is open at its base, so it has no underside to mill",
                           fmt::format("layer {}", slab.layer),
                           "close the pattern, or mill its slabs from above: layers.sides = \"one\"");
-    const Loops region = turned(underside_region(context, pattern, slab), slab);
+    const Loops region = underside_region(context, pattern, slab);
     if (region.empty())
         throw refusal("underside.none", "has an underside of which nothing is to be milled",
                       fmt::format("layer {}", slab.layer), "plan again");
@@ -202,7 +260,7 @@ Mesh underside_target(Context& context, MeshView pattern, const TurnedSlab& slab
     target.neighbours.assign(pattern.neighbours.begin(), pattern.neighbours.end());
     const auto vertex = static_cast<std::uint32_t>(target.vertices.size()),
                facet = static_cast<std::uint32_t>(target.facets.size());
-    const Mesh tray = Tray(slab, region, lowest - kUnder).make(context);
+    const Mesh tray = tray_of(context, region, slab, lowest - kUnder);
     target.vertices.insert(target.vertices.end(), tray.vertices.begin(), tray.vertices.end());
     for (Index3 f : tray.facets) {
         for (std::uint32_t& v : f) v += vertex;

@@ -14,6 +14,7 @@ struct UndersideFindings {
     int layer = 0;       ///< Layer::index
     std::string folder;  ///< within OUT
     SimulationReport report;
+    std::vector<Program> programs;  ///< that it is of
 };
 
 /// @param pattern the file's name. @param job_stated whether plan.json says by which limits it is judged
