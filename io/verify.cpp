@@ -354,9 +354,9 @@ UndersideFindings prove_underside(Context& context, const PlannedFolder& folder,
     if (!under.turned)
         throw Error(ErrorKind::verification, refusal.plan, "is no plan of a slab's underside",
                     (path / "plan.json").string(), "plan again");
-    UndersideFindings result{planned.layer, planned.folder, {}, {}};
     std::vector<Violation> found;
     const TurnedSlab slab = slab_of(folder.build, layer, *under.turned);
+    UndersideFindings result{planned.layer, planned.folder, slab, {}, {}};
     check_turned(under, slab,
                  layer > 0 ? std::span<const JointDowel>(folder.build.layers[layer - 1].dowels)
                            : std::span<const JointDowel>(),
@@ -368,7 +368,7 @@ UndersideFindings prove_underside(Context& context, const PlannedFolder& folder,
     set_heights(build, input.programs);
     check_sequence(path / "sequence.json", build, found);
     const Mesh target = underside_target(context, pattern, slab);
-    if (slab.web < kUndersideWeb && !hangs_together(context, target, slab))
+    if (slab.web < kWholeWeb && !hangs_together(context, target, slab))
         found.push_back({"underside.loose", "pieces of the slab come loose before it is laid", "", 0, {}, 0});
     const StandingPart part(context, target.view());
     input.mesh = target.view();
@@ -395,13 +395,13 @@ UndersideFindings prove_underside(Context& context, const PlannedFolder& folder,
 
 /// What stays filled in the layers, some of which are milled from both sides.
 void measure_unmade(Context& context, MeshView pattern, const PlannedFolder& folder,
-                    const std::map<int, double>& webs, SimulationReport& report) {
+                    const std::map<int, MilledLayer>& undersides, SimulationReport& report) {
     const AirGaps gaps = air_gaps(context, pattern, filled_cell(pattern));
     std::vector<MilledLayer> layers;
     for (const LayerToBuild& layer : folder.build.layers) {
-        MilledLayer& milled = layers.emplace_back(MilledLayer{layer.z_top, MilledFrom::above, 0});
-        if (const auto web = webs.find(layer.index); web != webs.end())
-            milled = {layer.z_top, MilledFrom::both_sides, web->second};
+        const auto under = undersides.find(layer.index);
+        layers.push_back(under != undersides.end() ? under->second
+                                                   : MilledLayer{layer.z_top, MilledFrom::above, 0});
     }
     const UnmadeAir left = unmade_air(context, gaps, layers);
     for (std::size_t l = 0; l < layers.size() && l < report.layers.size(); ++l) {
@@ -420,15 +420,15 @@ std::vector<UndersideFindings> prove_undersides(Context& context, const PlannedF
                                                 SimulationReport& report,
                                                 std::vector<Violation>& violations) {
     std::vector<UndersideFindings> undersides;
-    std::map<int, double> webs;
+    std::map<int, MilledLayer> milled;
     const std::vector<LayerToBuild>& layers = folder.build.layers;
     for (const UndersideToMill& planned : folder.build.undersides)
         for (std::size_t l = 0; l < layers.size(); ++l) {
             if (layers[l].index != planned.layer) continue;
             undersides.push_back(prove_underside(context, folder, l, planned, pattern, options, violations));
-            webs[planned.layer] = read_planned_folder(folder.path / planned.folder, {}).turned->web;
+            milled[planned.layer] = milled_layer(undersides.back().slab);
         }
-    if (!webs.empty()) measure_unmade(context, pattern, folder, webs, report);
+    if (!milled.empty()) measure_unmade(context, pattern, folder, milled, report);
     return undersides;
 }
 

@@ -193,12 +193,12 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     plan.layers = layers_between(plan.job, placement.boundaries);
     std::vector<MilledLayer> milled;
     if (gaps == nullptr) settle_undercuts(context, plan, pattern, origin);
-    else {
+    if (plan.job.flask.enabled) plan.flask = place_flask(context, pattern, plan);
+    saw_blanks(context, pattern, plan);
+    if (gaps != nullptr) {
         milled = milled_layers(context, plan, pattern, *gaps);
         settle_unmade(context, plan, *gaps, milled, origin);
     }
-    if (plan.job.flask.enabled) plan.flask = place_flask(context, pattern, plan);
-    saw_blanks(context, pattern, plan);
     check_chambers(plan);
     std::vector<std::vector<JointWood>> joints = wood_at_joints(context, pattern, plan);
     const std::optional<Mesh> propped = prop(context, plan, pattern, joints);

@@ -128,31 +128,28 @@ LayerPlacement place_two_sided(Context& context, const Job& job, const LayerRequ
 
 std::vector<MilledLayer> milled_layers(Context& context, const Plan& plan, MeshView pattern,
                                        const AirGaps& gaps) {
-    const auto layers_with = [&](double web) {
-        std::vector<MilledLayer> layers;
-        for (const Layer& layer : plan.layers)
-            layers.push_back({layer.z_top, web < 0 ? MilledFrom::above : MilledFrom::both_sides,
-                              std::max(web, film_web(layer.z_top - layer.z_bottom, layer.slab_thickness))});
-        return layers;
-    };
-    const std::vector<MilledLayer> from_above = layers_with(-1), film = layers_with(0),
-                                   thick = layers_with(kUndersideWeb);
-    const UnmadeAir above = unmade_air(context, gaps, from_above), of_film = unmade_air(context, gaps, film),
-                    of_thick = unmade_air(context, gaps, thick);
+    std::vector<MilledLayer> milled;
+    for (const Layer& layer : plan.layers) milled.push_back({layer.z_top, MilledFrom::above, 0});
+    const std::vector<MilledLayer> from_above = milled;
+    const UnmadeAir above = unmade_air(context, gaps, from_above);
     std::vector<double> heights(plan.layers.size(), 0);
     for (const UnmadePocket& p : above.pockets) heights[p.layer] = std::max(heights[p.layer], p.height_mm);
-    std::vector<MilledLayer> milled = from_above;
     for (std::size_t i = 0; i < milled.size(); ++i) {
         const Layer& layer = plan.layers[i];
-        if (heights[i] <= plan.job.tolerances.undercut || layer.slabs != 1 ||
-            above.of_layers[i] - of_film.of_layers[i] < kWorthMilling)
-            continue;
-        const TurnedSlab slab = turned_slab(plan, layer, film[i].web);
-        if (underside_region(context, pattern, slab).empty()) continue;
-        if (hangs_together(context, underside_target(context, pattern, slab), slab)) milled[i] = film[i];
-        else if (above.of_layers[i] - of_thick.of_layers[i] >= kWorthMilling &&
-                 layer.z_top - layer.z_bottom > kUndersideWeb + kOverWeb)
-            milled[i] = thick[i];
+        if (heights[i] <= plan.job.tolerances.undercut || layer.slabs != 1) continue;
+        const double height = layer.z_top - layer.z_bottom;
+        for (const double web : {film_web(height, layer.slab_thickness), kStripWeb, kWholeWeb}) {
+            if (height < web + kOverWeb) break;
+            const TurnedSlab slab = turned_slab(plan, layer, web);
+            if (underside_region(context, pattern, slab).empty()) break;
+            std::vector<MilledLayer> with = from_above;
+            with[i] = milled_layer(slab);
+            if (above.of_layers[i] - unmade_air(context, gaps, with).of_layers[i] < kWorthMilling) break;
+            if (web < kWholeWeb && !hangs_together(context, underside_target(context, pattern, slab), slab))
+                continue;
+            milled[i] = with[i];
+            break;
+        }
     }
     return milled;
 }

@@ -27,8 +27,8 @@ void check_two_sided(const Job& job, MeshView pattern);
                                              const AirGaps& gaps, const LayerPlacement& from_above);
 
 /// How each of a plan's layers is milled: on both sides where that makes air higher than tolerances.undercut
-/// and a cubic millimetre at least. Its web is a film where the slab hangs together without one, and else
-/// kUndersideWeb.
+/// and a cubic millimetre at least. Its web is a film where the slab hangs together without one, else one
+/// in strips, or a whole one.
 /// @param pattern with neighbours. @throws as underside_target()
 [[nodiscard]] std::vector<MilledLayer> milled_layers(Context& context, const Plan& plan, MeshView pattern,
                                                      const AirGaps& gaps);

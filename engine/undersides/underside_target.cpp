@@ -197,6 +197,40 @@ Loops turned(const Loops& region, const TurnedSlab& slab) {
     return loops;
 }
 
+/// A strip of the web, in the turned slab's frame; its ends lie in the tray's rim.
+Mesh strip(Context& context, const TurnedSlab& slab, double y, double bottom) {
+    const double top = slab.slab_thickness - (slab.z_top - slab.z_bottom) + slab.web;
+    const std::array<double, 2> xs{-kBeyond / 2, slab.blank.length() + kBeyond / 2},
+        ys{y - kStripWidth / 2, y + kStripWidth / 2}, zs{bottom, top};
+    Mesh box;
+    for (std::size_t k = 0; k < 8; ++k)
+        box.vertices.push_back({static_cast<float>(xs[k & 1]), static_cast<float>(ys[k >> 1 & 1]),
+                                static_cast<float>(zs[k >> 2])});
+    constexpr std::array<std::array<std::uint32_t, 4>, 6> sides{
+        {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}};
+    for (const auto& q : sides) {
+        box.facets.push_back({q[0], q[1], q[2]});
+        box.facets.push_back({q[0], q[2], q[3]});
+    }
+    pair_edges(context, box);
+    return box;
+}
+
+/// Adds a closed body to a mesh with neighbours.
+void append(const Mesh& body, Mesh& mesh) {
+    const auto vertex = static_cast<std::uint32_t>(mesh.vertices.size()),
+               facet = static_cast<std::uint32_t>(mesh.facets.size());
+    mesh.vertices.insert(mesh.vertices.end(), body.vertices.begin(), body.vertices.end());
+    for (Index3 f : body.facets) {
+        for (std::uint32_t& v : f) v += vertex;
+        mesh.facets.push_back(f);
+    }
+    for (Index3 n : body.neighbours) {
+        for (std::uint32_t& f : n) f = f == kNoFacet ? f : f + facet;
+        mesh.neighbours.push_back(n);
+    }
+}
+
 /// @param region in the pattern's frame
 Mesh tray_of(Context& context, const Loops& region, const TurnedSlab& slab, double bottom) {
     for (int k = 0; k < kOutlines; ++k) {
@@ -216,8 +250,25 @@ double film_web(double height, double slab_thickness) {
     return std::max(0.0, kUndersideFilm - (slab_thickness - height));
 }
 
+bool has_strips(const TurnedSlab& slab) {
+    const double film = film_web(slab.z_top - slab.z_bottom, slab.slab_thickness);
+    return slab.web > film && slab.web <= kStripWeb;
+}
+
 double recess_floor(const TurnedSlab& slab) {
-    return slab.slab_thickness - (slab.z_top - slab.z_bottom) + slab.web;
+    const double height = slab.z_top - slab.z_bottom;
+    const double web = has_strips(slab) ? film_web(height, slab.slab_thickness) : slab.web;
+    return slab.slab_thickness - height + web;
+}
+
+MilledLayer milled_layer(const TurnedSlab& slab) {
+    MilledLayer layer{slab.z_top, MilledFrom::both_sides, slab.web};
+    if (!has_strips(slab)) return layer;
+    layer.strip_pitch = kStripPitch;
+    layer.strip_width = kStripWidth;
+    layer.front = slab.blank.min[1];
+    layer.film = film_web(slab.z_top - slab.z_bottom, slab.slab_thickness);
+    return layer;
 }
 
 double underside_room(const Job& job) {
@@ -258,18 +309,10 @@ Mesh underside_target(Context& context, MeshView pattern, const TurnedSlab& slab
     }
     target.facets.assign(pattern.facets.begin(), pattern.facets.end());
     target.neighbours.assign(pattern.neighbours.begin(), pattern.neighbours.end());
-    const auto vertex = static_cast<std::uint32_t>(target.vertices.size()),
-               facet = static_cast<std::uint32_t>(target.facets.size());
-    const Mesh tray = tray_of(context, region, slab, lowest - kUnder);
-    target.vertices.insert(target.vertices.end(), tray.vertices.begin(), tray.vertices.end());
-    for (Index3 f : tray.facets) {
-        for (std::uint32_t& v : f) v += vertex;
-        target.facets.push_back(f);
-    }
-    for (Index3 n : tray.neighbours) {
-        for (std::uint32_t& f : n) f = f == kNoFacet ? f : f + facet;
-        target.neighbours.push_back(n);
-    }
+    append(tray_of(context, region, slab, lowest - kUnder), target);
+    if (has_strips(slab))
+        for (double y = kStripPitch / 2; y < slab.blank.width(); y += kStripPitch)
+            append(strip(context, slab, y, lowest - kUnder / 2), target);
     target.roles = facet_roles(context, target.view());
     return target;
 }

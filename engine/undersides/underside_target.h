@@ -9,23 +9,33 @@
 #pragma once
 
 #include "engine/plan.h"
+#include "kernels/features/unmade_air.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 #include "kernels/polygons/loops.h"
 
 namespace slabwright {
 
-/// mm of a slab that stay under its layer's top when its underside is milled and pieces of it would else come
-/// loose.
-inline constexpr double kUndersideWeb = 3;
+/// mm of a slab that stay under its layer's top where its underside is milled and pieces of it would else
+/// come loose: in strips along x, or, where these do not hold all pieces either, a little thicker and
+/// everywhere. TurnedSlab::web says which.
+inline constexpr double kStripWeb = 3, kWholeWeb = 3.5;
+/// mm of the strips, and from each to the next; the middle of the first lies half of that behind the slab's
+/// front edge.
+inline constexpr double kStripWidth = 6, kStripPitch = 40;
 /// mm over the spoil board that always stay; the top side takes them away. What the facing takes is among
 /// them.
 inline constexpr double kUndersideFilm = 0.5;
 
 /// The thinnest web that leaves a film. @param height, slab_thickness of the layer, mm
 [[nodiscard]] double film_web(double height, double slab_thickness);
-/// z of the floor of what is milled, in the turned slab's frame, mm.
+/// z of the floor of what is milled, beside strips, in the turned slab's frame, mm.
 [[nodiscard]] double recess_floor(const TurnedSlab& slab);
+/// Whether its web comes in strips.
+[[nodiscard]] bool has_strips(const TurnedSlab& slab);
+/// The layer of a slab that is milled on both sides, for what stays filled. In the frame that the slab's
+/// blank is told in.
+[[nodiscard]] MilledLayer milled_layer(const TurnedSlab& slab);
 
 /// mm around milled air that all end mills of the job need: the widest one, twice what roughing leaves, and
 /// room for leads.

@@ -13,6 +13,7 @@ namespace slabwright {
 struct UndersideFindings {
     int layer = 0;       ///< Layer::index
     std::string folder;  ///< within OUT
+    TurnedSlab slab;     ///< as the build lays it
     SimulationReport report;
     std::vector<Program> programs;  ///< that it is of
 };
