@@ -19,12 +19,10 @@
 #include "engine/planner/replan.h"
 #include "engine/schedule/cut_list.h"
 #include "engine/schedule/magazine.h"
-#include "engine/schedule/schedule.h"
 #include "engine/simulate/simulation_memory.h"
 #include "engine/simulate/work.h"
 #include "engine/tool_choice/access_map.h"
 #include "engine/tools/libraries.h"
-#include "engine/undersides/underside_target.h"
 #include "io/posts/dialect.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/probe_program.h"
@@ -385,31 +383,6 @@ VerifyResult write_verified(Context& context, const Plan& plan, const std::strin
     return write_and_verify(context, plan, directory,
                             {.source = pattern->place, .pattern = pattern, .cell = cell_mm});
 }
-
-namespace {
-
-/// Mends the undersides in which something was found, as a plan's layers are mended.
-/// @returns whether any has other programs
-bool mend_undersides(Context& context, Plan& plan, const Verification& found, int round) {
-    bool other = false;
-    for (const UndersideFindings& under : found.undersides) {
-        const auto at = std::find_if(plan.undersides.begin(), plan.undersides.end(),
-                                     [&](const Plan& p) { return p.turned->layer == under.layer; });
-        if (at == plan.undersides.end() || under.report.violations.empty()) continue;
-        Verification own;
-        own.report = under.report;
-        own.input.programs = under.programs;
-        const std::vector<LayerFaults> faults = faults_of(*at, own);
-        if (faults.empty()) continue;
-        const Mesh target = underside_target(context, found.pattern->read.mesh.view(), *at->turned);
-        const StandingPart part(context, target.view());
-        if (!Replanner(context, target.view(), part).mend(*at, faults, round).empty()) other = true;
-    }
-    if (other) schedule(plan);
-    return other;
-}
-
-}  // namespace
 
 VerifyResult write_proven(Context& context, Plan& plan, const std::string& directory,
                           const std::shared_ptr<Pattern>& pattern, bool keep_failed, double cell_mm) {

@@ -7,8 +7,8 @@
 #include <unordered_map>
 
 #include "engine/simulate/planned_build.h"
-#include "engine/simulate/probe_steps.h"
 #include "engine/simulate/step_order.h"
+#include "engine/simulate/underside_steps.h"
 
 namespace slabwright {
 
@@ -17,14 +17,12 @@ namespace {
 constexpr double kForce = 0.01;  // N and kg
 constexpr double kLitres = 0.01;
 
-class BuildReplay : ProbeSteps {
+class BuildReplay : UndersideSteps {
 public:
     BuildReplay(const BuildPlan& plan, const BuildSequence& sequence, BuildState from)
-        : ProbeSteps(plan, sequence.steps, std::move(from)), sequence_(sequence), slabs_(build_.slabs()) {
+        : UndersideSteps(plan, sequence.steps, std::move(from)), sequence_(sequence), slabs_(build_.slabs()) {
         s_.ran_in.resize(plan.programs.size());
         s_.faced_off.resize(plan.face_offs.size());
-        s_.undersides_milled.resize(plan.undersides.size());
-        s_.slabs_turned.resize(plan.undersides.size());
         programs_left_.resize(plan.layers.size());
         if (plan.job_stated) s_.magazine.resize(static_cast<std::size_t>(plan.job.machine.magazine), 0);
         s_.magazine_set.resize(s_.magazine.size());
@@ -52,11 +50,6 @@ public:
     }
 
 private:
-    /// Seconds that only the job can tell.
-    void expect_job_seconds(double planned) {
-        if (plan_.job_stated) expect_seconds(planned, kSeconds);
-    }
-
     // --- the steps
 
     void check_head() {
@@ -110,51 +103,9 @@ private:
         expect("sequence.slab", "width_mm", blank.width(), kLength);
     }
 
-    /// Which of the plan's undersides the step is about; none, and told, where it is about no such.
-    [[nodiscard]] std::optional<std::size_t> named_underside() {
-        for (std::size_t u = 0; u < plan_.undersides.size(); ++u)
-            if (plan_.undersides[u].layer == step().layer) return u;
-        complain("sequence.layer", fmt::format("the plan mills no underside of layer {}", step().layer));
-        return std::nullopt;
-    }
-
-    /// A slab lies upside down on a spoil board and is milled by a sequence of its own.
-    void mill_underside() {
-        if (s_.board) complain("sequence.order", "the base board is mounted where the spoil board would lie");
-        const std::optional<std::size_t> u = named_underside();
-        if (!u) return;
-        const UndersideToMill& under = plan_.undersides[*u];
-        if (s_.undersides_milled[*u]) complain("sequence.order", "the underside is milled already");
-        for (std::size_t other = 0; other < plan_.undersides.size(); ++other)
-            if (s_.undersides_milled[other]) wait_for(s_.slabs_turned[other]);
-        expect_word("sequence.program", "sequence", under.folder + "/sequence.json");
-        if (under.minutes) expect_seconds(*under.minutes * 60, kSeconds);
-        s_.undersides_milled[*u] = here();
-    }
-
-    void turn_over() {
-        const std::optional<std::size_t> u = named_underside();
-        if (!u) return;
-        require(s_.undersides_milled[*u], "the underside is not milled");
-        if (s_.slabs_turned[*u]) complain("sequence.order", "the slab is turned already");
-        expect_job_seconds(plan_.job.bonding.handling_s / 3);
-        s_.slabs_turned[*u] = here();
-    }
-
-    /// All undersides must be milled, and their slabs turned.
-    void require_turned() {
-        for (std::size_t u = 0; u < plan_.undersides.size(); ++u) require_turned(u);
-    }
-    void require_turned(std::size_t u) {
-        if (!s_.slabs_turned[u])
-            complain("sequence.order", fmt::format("layer {}'s slab is not turned with its underside milled",
-                                                   plan_.undersides[u].layer));
-        else wait_for(s_.slabs_turned[u]);
-    }
-
     void mount_board() {
         if (s_.board) complain("sequence.order", "a board is mounted already");
-        require_turned();
+        require_all_turned();
         expect_layer(0);
         expect_seconds(0, kSeconds);
         expect_size({plan_.stock_min, plan_.stock_max});
@@ -183,7 +134,7 @@ private:
             complain("sequence.feed", fmt::format("{} slabs still lie in the feed chamber", s_.in_feed));
         if (s_.taken < slabs_.size()) expect_layer(slabs_[s_.taken].layer);
         wait_for(s_.last_taken);
-        require_turned();
+        require_all_turned();
         const int count = whole("slabs").value_or(0);
         if (count < 1 || static_cast<std::size_t>(count) > slabs_.size() - std::min(s_.taken, slabs_.size()))
             complain("sequence.feed", fmt::format("loads {} slabs where the build still takes {}", count,
@@ -241,8 +192,7 @@ private:
         } else {
             const DueSlab& slab = slabs_[s_.taken];
             expect_layer(slab.layer);
-            for (std::size_t u = 0; u < plan_.undersides.size(); ++u)
-                if (plan_.undersides[u].layer == plan_.layers[slab.layer].index) require_turned(u);
+            require_turned(plan_.layers[slab.layer].index);
             expect_size(slab.blank);
             expect("sequence.slab", "thickness_mm", slab.thickness, kLength);
             if (plan_.job_stated) expect("sequence.mass", "mass_kg", slab.kg, kForce);
@@ -357,16 +307,6 @@ private:
         s_.touched.reset();
         s_.table_at.reset();
         s_.hand_free = s_.to_press = here();
-    }
-
-    /// An upside-down slab is held on its board for as long as it is milled.
-    void hold_down() {
-        if (!plan_.turned) complain("sequence.action", "is no action of this build");
-        require(s_.to_press, "no slab lies on the board");
-        if (s_.placed > 0) expect_layer(slabs_[s_.placed - 1].layer);
-        expect_job_seconds(plan_.job.bonding.handling_s / 3);
-        s_.to_press.reset();
-        s_.pressed = here();
     }
 
     void press() {
@@ -627,11 +567,7 @@ private:
         if (s_.placed < slabs_.size())
             complain("sequence.missing", fmt::format("{} of {} slabs are never placed",
                                                      slabs_.size() - s_.placed, slabs_.size()));
-        for (std::size_t u = 0; u < plan_.undersides.size(); ++u)
-            if (!s_.slabs_turned[u])
-                complain("sequence.missing",
-                         fmt::format("the underside of layer {}'s slab is not milled, or the slab not turned",
-                                     plan_.undersides[u].layer));
+        check_undersides_at_end();
         for (std::size_t p = 0; p < plan_.programs.size(); ++p)
             if (!s_.ran_in[p])
                 complain("sequence.missing", fmt::format("{} is never run", plan_.programs[p].file));
@@ -645,11 +581,6 @@ private:
 };
 
 }  // namespace
-
-bool mills_underside(const BuildPlan& plan, int layer) {
-    return std::any_of(plan.undersides.begin(), plan.undersides.end(),
-                       [&](const UndersideToMill& under) { return under.layer == layer; });
-}
 
 std::vector<Violation> replay_build(const BuildPlan& plan, const BuildSequence& sequence) {
     if (plan.layers.empty()) return {};

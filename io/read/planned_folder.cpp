@@ -406,28 +406,22 @@ std::vector<JointDowel> read_dowels(const Field& all) {
 }
 
 void read_underside(const Field& underside, int layer, BuildPlan& build) {
-    UndersideToMill& under = build.undersides.emplace_back();
-    under.layer = layer;
-    under.folder = underside["folder"].text();
-    if (under.folder != underside_folder(layer)) underside["folder"].fail("is not that of the layer");
-    if (underside.has("minutes")) under.minutes = underside["minutes"].number();
+    build.undersides.push_back({layer, underside["folder"].text(), underside["minutes"].number()});
+    if (build.undersides.back().folder != underside_folder(layer))
+        underside["folder"].fail("is not that of the layer");
 }
 
 /// What a plan says of the slab whose underside it is of; none where it is of a build.
 std::optional<TurnedSlab> read_turned(const Field& plan) {
     if (!plan.has("turned")) return std::nullopt;
     const Field from = plan["turned"];
-    TurnedSlab slab;
-    slab.layer = from["layer"].whole();
-    slab.z_bottom = from["z_bottom"].number();
-    slab.z_top = from["z_top"].number();
-    slab.slab_thickness = from["slab_thickness"].number();
+    const auto mm = [&](const char* key) { return from[key].number(); };
+    TurnedSlab slab{
+        from["layer"].whole(), mm("z_bottom"), mm("z_top"), mm("slab_thickness"), {}, mm("web"), mm("room")};
     for (std::size_t k = 0; k < 2; ++k) {
         slab.blank.min[k] = from["min"][k].number();
         slab.blank.max[k] = from["max"][k].number();
     }
-    slab.web = from["web"].number();
-    slab.room = from["room"].number();
     return slab;
 }
 

@@ -362,6 +362,14 @@ void visit_dowel_keys(DowelsLike& dowels, Visit& visit) {
     visit.key("set_s", dowels.set_s, "s, to set one by hand");
 }
 
+template <class LayersLike, class Visit>
+void visit_sides_key(LayersLike& layers, Visit& visit) {
+    if (shows(visit, layers.sides != SlabSides::one))
+        visit.word("sides", layers.sides, kSidesWords,
+                   "one: slabs are milled from above; two: under overhangs from below too, before they are "
+                   "turned and laid; auto: two where that makes more");
+}
+
 /// Walks every key that any plan has: all of visit_job_keys but those of dowels.
 template <class JobLike, class Visit>
 void visit_plain_job_keys(JobLike& job, Visit& visit) {
@@ -413,10 +421,7 @@ void visit_plain_job_keys(JobLike& job, Visit& visit) {
     visit.word("strategy", job.layers.strategy, kStrategyWords,
                "optimal, printed (LUO 4.2.5), combined: slabs bonded to any thickness, whatever is built "
                "fastest (LUO 6.4.2), or uniform: as thick as they may be, for comparing");
-    if (shows(visit, job.layers.sides != SlabSides::one))
-        visit.word("sides", job.layers.sides, kSidesWords,
-                   "of slabs that are milled: one, the top; two, where there are overhangs the underside too, "
-                   "before the slab is turned and laid; or auto, two where that makes more");
+    visit_sides_key(job.layers, visit);
     visit.word(
         "supports", job.layers.supports, kSupportWords,
         "auto: columns of stock stay under what nothing of the pattern carries, to be sawn off; or none");
