@@ -29,6 +29,7 @@
 #include "io/write/report_draw.h"
 #include "io/write/report_outlines.h"
 #include "io/write/report_reach.h"
+#include "io/write/report_undersides.h"
 #include "io/write/thinned_path.h"
 #include "kernels/access/deviation.h"
 #include "kernels/errors.h"
@@ -506,6 +507,8 @@ std::string report_html(Context& context, const std::string& directory, const Re
     Figures figures;
     figures.data = {
         {"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", plan}, {"verify", verify}};
+    if (!folder.build.undersides.empty())
+        figures.data["undersides"] = report_undersides(context, folder, mesh, kRefusal);
     check_draw_of(context, mesh, figures);
     const auto draw = [&] {
         Json& steps = figures.data["steps"] = Json::array();

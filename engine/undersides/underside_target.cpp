@@ -183,20 +183,6 @@ Loops without_straight_points(const Loops& region) {
     return kept;
 }
 
-/// A region of the pattern's frame in the turned slab's.
-Loops turned(const Loops& region, const TurnedSlab& slab) {
-    Loops loops;
-    const std::int32_t right = to_units(slab.blank.max[0]), front = to_units(slab.blank.min[1]);
-    for (std::size_t l = 0; l < region.size(); ++l) {
-        const auto loop = region.loop(l);
-        for (auto p = loop.rbegin(); p != loop.rend(); ++p)
-            loops.points.push_back({right - p->x, p->y - front});
-        loops.close_loop();
-    }
-    nest(loops);
-    return loops;
-}
-
 /// A strip of the web, in the turned slab's frame; its ends lie in the tray's rim.
 Mesh strip(Context& context, const TurnedSlab& slab, double y, double bottom) {
     const double top = slab.slab_thickness - (slab.z_top - slab.z_bottom) + slab.web;
@@ -236,7 +222,7 @@ Mesh tray_of(Context& context, const Loops& region, const TurnedSlab& slab, doub
     for (int k = 0; k < kOutlines; ++k) {
         const Loops wider =
             k == 0 ? region : intersect(offset(region, k * kWider, kFine), rectangle(slab.blank, kRim));
-        if (auto tray = Tray(slab, turned(without_straight_points(wider), slab), bottom).make(context))
+        if (auto tray = Tray(slab, turned_region(without_straight_points(wider), slab), bottom).make(context))
             return std::move(*tray);
     }
     throw refusal("underside.outline", "the outline of what is milled from below cannot be filled",
@@ -245,6 +231,19 @@ Mesh tray_of(Context& context, const Loops& region, const TurnedSlab& slab, doub
 }
 
 }  // namespace
+
+Loops turned_region(const Loops& region, const TurnedSlab& slab) {
+    Loops loops;
+    const std::int32_t right = to_units(slab.blank.max[0]), front = to_units(slab.blank.min[1]);
+    for (std::size_t l = 0; l < region.size(); ++l) {
+        const auto loop = region.loop(l);
+        for (auto p = loop.rbegin(); p != loop.rend(); ++p)
+            loops.points.push_back({right - p->x, p->y - front});
+        loops.close_loop();
+    }
+    nest(loops);
+    return loops;
+}
 
 double film_web(double height, double slab_thickness) {
     return std::max(0.0, kUndersideFilm - (slab_thickness - height));

@@ -47,6 +47,9 @@ inline constexpr double kUndersideFilm = 0.5;
 /// @throws as slice() and shadows()
 [[nodiscard]] Loops underside_region(Context& context, MeshView pattern, const TurnedSlab& slab);
 
+/// A region of the pattern's frame in the turned slab's, nested.
+[[nodiscard]] Loops turned_region(const Loops& region, const TurnedSlab& slab);
+
 /// The target, with neighbours and roles, in the turned slab's frame.
 /// @param pattern pattern-base, mm, with neighbours
 /// @throws Error(no_plan, "underside.open") for a pattern that is open at its base, Error(no_plan,
