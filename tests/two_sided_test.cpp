@@ -13,9 +13,15 @@
 #include <string>
 #include <vector>
 
+#include "engine/undersides/loose_pieces.h"
+#include "engine/undersides/underside_target.h"
+#include "io/quote.h"
 #include "io/slabwright.h"
 #include "io/write/stl_writer.h"
+#include "kernels/features/unmade_air.h"
 #include "kernels/mesh/weld.h"
+#include "kernels/slicing/slicing.h"
+#include "tests/support/command.h"
 #include "tests/support/files.h"
 #include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
@@ -231,6 +237,34 @@ TEST_F(TwoSided, WhatDoesNotGoWithItIsRefused) {
     EXPECT_EQ(refused([](Job& job) { job.layers.sides = SlabSides::one; }), "undercut.unmade");
 }
 
+TEST_F(TwoSided, CommandsThatDoNotKnowItSaySo) {
+    const auto told = [&](std::vector<std::string> arguments) {
+        arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
+        return support::run_command(arguments);
+    };
+    const support::CommandResult resumed = told({"resume", built_->out});
+    EXPECT_EQ(resumed.exit, 2) << resumed.err;
+    EXPECT_NE(resumed.err.find("both sides"), std::string::npos) << resumed.err;
+    const support::CommandResult without_dowels =
+        told({"plan", built_->stl, "--sides", "two", "-o", built_->folder / "other"});
+    EXPECT_EQ(without_dowels.exit, 2) << without_dowels.err;
+    EXPECT_NE(without_dowels.err.find("dowels.per_joint"), std::string::npos) << without_dowels.err;
+    const support::CommandResult alone = told({"verify", built_->undersides.at(0)});
+    EXPECT_NE(alone.exit, 0);
+    EXPECT_NE(alone.err.find("underside"), std::string::npos) << alone.err;
+    Context context;
+    EXPECT_THROW((void)quote_model(context, built_->stl, two_sided()), Error);
+}
+
+TEST_F(TwoSided, AFolderWithUndersidesIsReplacedAsAPlanAndKeptWithAStranger) {
+    EXPECT_NO_THROW(require_replaceable(built_->out));
+    const std::string note = built_->undersides.at(0) + "/note.txt";
+    spit(note, "mine");
+    EXPECT_THROW(require_replaceable(built_->out), Error);
+    std::filesystem::remove(note);
+    EXPECT_NO_THROW(require_replaceable(built_->out));
+}
+
 TEST_F(TwoSided, AutomaticMillsFromBelowOnlyWhereThatMakesMore) {
     Context context;
     Job job = two_sided();
@@ -239,6 +273,64 @@ TEST_F(TwoSided, AutomaticMillsFromBelowOnlyWhereThatMakesMore) {
     const std::string block = built_->folder / "block.stl";
     write_stl(block, weld(context, shapes::box({0, 0, 0}, {100, 70, 36})));
     EXPECT_TRUE(plan(context, block, job).undersides.empty());
+}
+
+/// A slab of 19 mm in a block of 60 x 40 x 18 mm, with 10 mm around it.
+TurnedSlab slab_of_block() { return {1, 0, 18, 19, {{-10, -10}, {70, 50}}, 0, 10}; }
+
+TEST(UndersideTarget, IsThePatternTurnedInItsTray) {
+    Context context;
+    // A plate on a foot: what lies beside the foot, under the plate, is milled from below.
+    shapes::Facets facets = shapes::box({20, 10, 0}, {40, 30, 10});
+    shapes::append(facets, shapes::box({0, 0, 8}, {60, 40, 18}));
+    const Mesh pattern = weld(context, facets);
+    TurnedSlab slab = slab_of_block();
+    const Mesh target = underside_target(context, pattern.view(), slab);
+    const std::vector<Plane> planes{{5, Side::above}, {18, Side::above}, {0.5, Side::above}};
+    const std::vector<Section> sections = slice(context, target.view(), planes);
+    const auto is_solid = [&](std::size_t k, double x, double y) {
+        return winding(sections[k].loops, {to_units(x), to_units(y)}) != 0;
+    };
+    EXPECT_TRUE(is_solid(0, 40, 30));   // the plate, which lies at z' 1 to 11
+    EXPECT_TRUE(is_solid(1, 40, 30));   // the foot
+    EXPECT_FALSE(is_solid(1, 15, 30));  // beside it
+    EXPECT_TRUE(is_solid(1, 1, 1));     // the rim
+    EXPECT_TRUE(is_solid(2, 5, 5));     // the film
+    EXPECT_TRUE(hangs_together(context, target, slab) ||
+                area(underside_region(context, pattern.view(), slab)) > 70.0 * 50);
+}
+
+TEST(UndersideTarget, WhatComesLooseIsHeldByStrips) {
+    Context context;
+    // A mushroom upside down: its cap is an island in what is milled around it.
+    shapes::Facets facets = shapes::box({25, 15, 0}, {35, 25, 10});
+    shapes::append(facets, shapes::box({15, 5, 8}, {45, 35, 18}));
+    const Mesh pattern = weld(context, facets);
+    TurnedSlab slab = slab_of_block();
+    slab.blank = {{-30, -30}, {90, 70}};
+    EXPECT_FALSE(hangs_together(context, underside_target(context, pattern.view(), slab), slab));
+    slab.web = kStripWeb;
+    EXPECT_TRUE(has_strips(slab));
+    EXPECT_TRUE(hangs_together(context, underside_target(context, pattern.view(), slab), slab));
+    slab.web = kWholeWeb;
+    EXPECT_FALSE(has_strips(slab));
+}
+
+TEST(UndersideTarget, WhatLiesInItsWebStaysUnmade) {
+    Context context;
+    // Under a roof that is 1 mm thick: of 17 mm of air 2 lie in the web.
+    shapes::Facets facets = shapes::box({0, 0, 0}, {20, 40, 18});
+    shapes::append(facets, shapes::box({10, 0, 17}, {60, 40, 18}));
+    const AirGaps gaps = air_gaps(context, weld(context, facets).view(), 0.5);
+    const auto left = [&](const MilledLayer& layer) {
+        return unmade_air(context, gaps, {{layer}}).volume_mm3;
+    };
+    const double mm2 = 40 * 40;
+    EXPECT_NEAR(left({18, MilledFrom::above}), 17 * mm2, 0.03 * 17 * mm2);
+    EXPECT_NEAR(left({18, MilledFrom::both_sides}), 0, 1);
+    EXPECT_NEAR(left({18, MilledFrom::both_sides, 3}), 2 * mm2, 0.05 * 2 * mm2);
+    const MilledLayer strips{18, MilledFrom::both_sides, 3, 20, 5, 0, 0};
+    EXPECT_NEAR(left(strips), 2 * mm2 / 4, 0.15 * 2 * mm2 / 4);
 }
 
 }  // namespace

@@ -360,11 +360,6 @@ CLI::App* add_inspect_command(CLI::App& app, Options& options) {
         "inspect", "report on mesh, features, undercuts, and what keeps the pattern from being drawn");
     command->add_option("STL", options.stl, "the pattern")->required();
     add_common(*command, options);
-    command
-        ->add_option("--sides", options.sides,
-                     "of slabs that are milled: one, the top; two, the underside too where there are "
-                     "overhangs; or auto, two where that makes more")
-        ->check(CLI::IsMember({"one", "two", "auto"}));
     command->add_option("--finder", options.finder, "of features: exact, halving or both")
         ->check(CLI::IsMember({"exact", "halving", "both"}));
     add_inspection_options(*command, options.inspection);
@@ -378,6 +373,11 @@ CLI::App* add_plan_command(CLI::App& app, Options& options) {
     add_common(*command, options);
     command->add_option("--strategy", options.strategy, "of layer placement: optimal, printed or combined")
         ->check(CLI::IsMember({"optimal", "printed", "combined"}));
+    command
+        ->add_option("--sides", options.sides,
+                     "of slabs that are milled: one, the top; two, the underside too where there are "
+                     "overhangs; or auto, two where that makes more")
+        ->check(CLI::IsMember({"one", "two", "auto"}));
     command->add_option("--finder", options.finder, "of features: exact, halving or both")
         ->check(CLI::IsMember({"exact", "halving", "both"}));
     command
