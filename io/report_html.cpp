@@ -508,7 +508,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
     figures.data = {
         {"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", plan}, {"verify", verify}};
     if (!folder.build.undersides.empty())
-        figures.data["undersides"] = report_undersides(context, folder, mesh, kRefusal);
+        figures.data["undersides"] = Json::parse(report_undersides(context, folder, mesh, kRefusal));
     check_draw_of(context, mesh, figures);
     const auto draw = [&] {
         Json& steps = figures.data["steps"] = Json::array();

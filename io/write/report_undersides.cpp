@@ -1,6 +1,7 @@
 #include "io/write/report_undersides.h"
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "engine/undersides/underside_target.h"
 
@@ -27,8 +28,8 @@ Json outlines(const Loops& region) {
 
 }  // namespace
 
-Json report_undersides(Context& context, const PlannedFolder& folder, MeshView mesh,
-                       const FolderRefusal& refusal) {
+std::string report_undersides(Context& context, const PlannedFolder& folder, MeshView mesh,
+                              const FolderRefusal& refusal) {
     Json list = Json::array();
     for (const UndersideToMill& planned : folder.build.undersides) {
         const PlannedFolder under = read_planned_folder(folder.path / planned.folder, refusal);
@@ -54,7 +55,7 @@ Json report_undersides(Context& context, const PlannedFolder& folder, MeshView m
                         {"dowels", std::move(dowels)},
                         {"programs", std::move(programs)}});
     }
-    return list;
+    return list.dump();
 }
 
 }  // namespace slabwright

@@ -1,7 +1,7 @@
 // What the report tells of slabs' undersides.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <string>
 
 #include "io/read/planned_folder.h"
 #include "kernels/mesh/mesh.h"
@@ -9,10 +9,10 @@
 
 namespace slabwright {
 
-/// For each underside: its slab as it lies turned over, mm, where it is milled (`region`, outlines in
-/// hundredths of a millimetre), its dowels' holes, and its programs.
+/// A JSON list, for each underside: its slab as it lies turned over, mm, where it is milled (`region`,
+/// outlines in hundredths of a millimetre), its dowels' holes, and its programs.
 /// @param mesh the pattern. @throws Error(input) where a plan of an underside cannot be read
-[[nodiscard]] nlohmann::json report_undersides(Context& context, const PlannedFolder& folder, MeshView mesh,
-                                               const FolderRefusal& refusal);
+[[nodiscard]] std::string report_undersides(Context& context, const PlannedFolder& folder, MeshView mesh,
+                                            const FolderRefusal& refusal);
 
 }  // namespace slabwright
