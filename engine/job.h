@@ -218,11 +218,16 @@ struct Tolerances {
                             ///< the paths; 0: the facets as they are
 };
 
+/// Which sides of the slabs are milled: the top, on the stack; where that leaves air under overhangs, the
+/// underside as well, before the slab is turned and laid; or, automatic, both where that makes more.
+enum class SlabSides : std::uint8_t { one, two, automatic };
+
 /// Whether columns of stock stay under what nothing of the pattern carries (engine/schedule/supports).
 enum class SupportRule : std::uint8_t { none, automatic };
 
 struct LayerPlanning {
     LayerStrategy strategy = LayerStrategy::optimal;
+    SlabSides sides = SlabSides::one;
     SupportRule supports = SupportRule::automatic;
     Finder finder = Finder::exact;
     double min_layer = 3.0;          ///< thinnest layer that is not reported

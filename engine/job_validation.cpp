@@ -289,6 +289,15 @@ void validate_dowels(const JointDowels& dowels) {
                "a dowel does not hold in that: give deeper holes");
 }
 
+void validate_joining(const Job& job) {
+    validate_dowels(job.dowels);
+    if (job.layers.sides != SlabSides::one && job.dowels.per_joint == 0)
+        refuse("layers.sides",
+               "slabs that are milled on both sides and turned are brought to their place by dowels, and "
+               "dowels.per_joint is 0",
+               "give dowels.per_joint = 2, or layers.sides = \"one\"");
+}
+
 }  // namespace
 
 void validate(const Job& job) {
@@ -324,7 +333,7 @@ void validate(const Job& job) {
     validate_machine(job.machine, job.probing);
     validate_bonding(job.bonding);
     validate_prices(job.prices, s);
-    validate_dowels(job.dowels);
+    validate_joining(job);
 
     const Tolerances& t = job.tolerances;
     require("tolerances.gouge", t.gouge, 0.001, 1, Ends::closed, kFinerThanProgrammed);

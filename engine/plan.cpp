@@ -6,6 +6,8 @@
 #include <numbers>
 #include <system_error>
 
+#include <fmt/format.h>
+
 #include "kernels/geometry/vectors.h"
 
 namespace slabwright {
@@ -41,6 +43,8 @@ std::string_view name(OperationKind kind) {
     }
     return "";
 }
+
+std::string underside_folder(int layer) { return fmt::format("undersides/L{:03}", layer); }
 
 std::string_view file_of(std::string_view program) { return program.substr(0, program.find('#')); }
 

@@ -227,12 +227,25 @@ struct Support {
     friend bool operator==(const Support&, const Support&) = default;
 };
 
+/// A slab whose underside is milled before it is laid, upside down on a spoil board. It has been turned about
+/// y: there x counts from its edge of greatest x, y from its front edge and z from the board, so that a point
+/// of the pattern lies at (blank.max[0] − x, y − blank.min[1], z_bottom + slab_thickness − z). Millimetres.
+struct TurnedSlab {
+    int layer = 0;                                       ///< Layer::index
+    double z_bottom = 0, z_top = 0, slab_thickness = 0;  ///< of the layer, pattern-base
+    Blank blank;                                         ///< of the slab, pattern-base
+    double web = 0;   ///< that stays under the layer's top, so that all hangs together until it is laid
+    double room = 0;  ///< around what is milled away, for cutters
+    friend bool operator==(const TurnedSlab&, const TurnedSlab&) = default;
+};
+
 struct Totals {
     int layers = 0, operations = 0, tool_changes = 0;
     int magazine_swaps = 0;  ///< a tool of the magazine taken out for another
     double cutting_mm = 0, rapid_mm = 0;
     double cutting_minutes = 0, bonding_minutes = 0, tool_change_minutes = 0, table_minutes = 0,
            magazine_minutes = 0, build_minutes = 0;
+    double underside_minutes = 0;  ///< of build_minutes, what is done to slabs before the build
     double stock_volume_mm3 = 0, part_volume_mm3 = 0, stack_mass_kg = 0;
 };
 
@@ -295,7 +308,12 @@ struct Plan {
     std::vector<ProbeProgram> probes;  ///< in the order of execution
     Totals totals;
     std::vector<Diagnostic> diagnostics;
+    std::optional<TurnedSlab> turned;  ///< of a plan for a slab's underside, in the turned slab's frame
+    std::vector<Plan> undersides;      ///< of its layers' slabs, ascending; each with `turned`
 };
+
+/// The folder of an underside's plan within that of the plan: "undersides/L003".
+[[nodiscard]] std::string underside_folder(int layer);
 
 /// x 0, y 0 of the programs, 0.1 µm, pattern-base: machine.zero. The base board is as large as the stock.
 [[nodiscard]] inline Point2 work_zero(const Plan& plan) {

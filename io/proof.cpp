@@ -6,6 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "engine/planner/replan.h"
+#include "engine/schedule/schedule.h"
+#include "engine/undersides/underside_target.h"
 #include "io/posts/gcode_writer.h"
 
 namespace slabwright {
@@ -172,6 +175,25 @@ std::vector<LayerFaults> faults_of(const Plan& plan, const Verification& found) 
         with_faults.push_back(std::move(of));
     }
     return with_faults;
+}
+
+bool mend_undersides(Context& context, Plan& plan, const Verification& found, int round) {
+    bool other = false;
+    for (const UndersideFindings& under : found.undersides) {
+        const auto at = std::find_if(plan.undersides.begin(), plan.undersides.end(),
+                                     [&](const Plan& p) { return p.turned->layer == under.layer; });
+        if (at == plan.undersides.end() || under.report.violations.empty()) continue;
+        Verification own;
+        own.report = under.report;
+        own.input.programs = under.programs;
+        const std::vector<LayerFaults> faults = faults_of(*at, own);
+        if (faults.empty()) continue;
+        const Mesh target = underside_target(context, found.pattern->read.mesh.view(), *at->turned);
+        const StandingPart part(context, target.view());
+        if (!Replanner(context, target.view(), part).mend(*at, faults, round).empty()) other = true;
+    }
+    if (other) schedule(plan);
+    return other;
 }
 
 std::vector<Error> refusals_of(const SimulationReport& report, const std::string& stl) {

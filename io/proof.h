@@ -20,6 +20,11 @@ namespace slabwright {
 /// @param found of the folder that was written of this plan, with VerifyOptions::faults
 [[nodiscard]] std::vector<LayerFaults> faults_of(const Plan& plan, const Verification& found);
 
+/// Mends the undersides in which something was found, as a plan's layers are mended (Replanner); the plan's
+/// sequence follows. @param found as for faults_of(). @param round 1 …
+/// @returns whether any has other programs. @throws as Replanner::mend() and underside_target()
+[[nodiscard]] bool mend_undersides(Context& context, Plan& plan, const Verification& found, int round);
+
 /// An error of kind no_plan for each thing that was found: what, where, and what may help.
 /// @param stl the pattern's file
 [[nodiscard]] std::vector<Error> refusals_of(const SimulationReport& report, const std::string& stl);

@@ -30,6 +30,7 @@
 #include "io/write/report_draw.h"
 #include "io/write/report_outlines.h"
 #include "io/write/report_reach.h"
+#include "io/write/report_undersides.h"
 #include "io/write/thinned_path.h"
 #include "kernels/access/deviation.h"
 #include "kernels/errors.h"
@@ -333,6 +334,8 @@ void look_at_pattern(Context& context, MeshView mesh, const PlannedFolder& folde
     std::vector<double> tops;
     for (const SimulatedLayer& layer : folder.simulation.layers) tops.push_back(layer.z_top);
     figures.data["cavities"] = Json::parse(report_cavities(context, mesh, job, tops));
+    if (!folder.build.undersides.empty())
+        figures.data["undersides"] = Json::parse(report_undersides(context, folder, mesh, kRefusal));
 }
 
 /// The pattern for the 3D view: places as 16-bit shares of its box.

@@ -95,6 +95,11 @@ public:
           place_((out_ / kProgress).string()) {}
 
     ResumeStatus run() {
+        if (folder_.turned || !folder_.build.undersides.empty())
+            throw Error(ErrorKind::usage, "resume.sides",
+                        "a build with slabs milled on both sides cannot be resumed yet",
+                        (out_ / "plan.json").string(),
+                        "go on by hand after the last step of sequence.json that was finished");
         read_progress();
         if (options_.after) progress_.after = *options_.after;
         if (progress_.after < 0 ||

@@ -172,14 +172,15 @@ namespace {
 
 // All of a plan but what is found about it, into a folder under way.
 // @param other for each layer whether its programs are other than those that the folder holds; empty: all are
-void fill(Context& context, const Plan& plan, const OutputFolder& out, const std::vector<bool>& other = {}) {
+void fill(Context& context, const Plan& plan, const std::filesystem::path& out,
+          const std::vector<bool>& other = {}) {
     struct PlannedFile {
         const Layer* layer;
         std::size_t begin;  // its first operation
         std::string name;
     };
     std::vector<PlannedFile> files;
-    const std::filesystem::path programs_folder = out.path() / "nc";
+    const std::filesystem::path programs_folder = out / "nc";
     std::filesystem::create_directory(programs_folder);
     std::set<std::string> stale;  // what the folder holds and the plan does not name
     for (const auto& entry : std::filesystem::directory_iterator(programs_folder))
@@ -207,16 +208,23 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out, const std
         context.advance();
     });
     if (plan.job.machine.post == Post::linuxcnc)
-        write_file_in(out.path(), "tool.tbl",
+        write_file_in(out, "tool.tbl",
                       tool_table(plan.job, magazine_at_start(plan.sequence, plan.job.machine.magazine)));
-    if (plan.job.machine.own_post) write_file_in(out.path(), kOwnPostFile, plan.job.machine.own_post->text);
-    write_file_in(out.path(), "sequence.json", sequence_json(plan));
-    const CutList list = cut_list(plan);
-    write_file_in(out.path(), "cut_list.csv", cut_list_csv(list));
-    const std::vector<UndersideHole> holes = underside_holes(plan);
-    write_file_in(out.path(), "cut_list.dxf", cut_list_dxf(list, holes));
-    if (!holes.empty()) write_file_in(out.path(), "dowels.csv", dowels_csv(holes));
-    write_file_in(out.path(), "plan.json", plan_json(plan));
+    if (plan.job.machine.own_post) write_file_in(out, kOwnPostFile, plan.job.machine.own_post->text);
+    write_file_in(out, "sequence.json", sequence_json(plan));
+    if (!plan.turned) {
+        const CutList list = cut_list(plan);
+        write_file_in(out, "cut_list.csv", cut_list_csv(list));
+        const std::vector<UndersideHole> holes = underside_holes(plan);
+        write_file_in(out, "cut_list.dxf", cut_list_dxf(list, holes));
+        if (!holes.empty()) write_file_in(out, "dowels.csv", dowels_csv(holes));
+    }
+    write_file_in(out, "plan.json", plan_json(plan));
+    for (const Plan& under : plan.undersides) {
+        const std::filesystem::path folder = out / underside_folder(under.turned->layer);
+        std::filesystem::create_directories(folder);
+        fill(context, under, folder);
+    }
     context.throw_if_cancelled();
     context.advance();
 }
@@ -311,7 +319,7 @@ std::string program_document(const Plan& plan, const Layer& layer, const Operati
 void write(Context& context, const Plan& plan, const std::string& directory, const PatternSource& source) {
     guarded([&] {
         OutputFolder out(directory);
-        fill(context, plan, out);
+        fill(context, plan, out.path());
         if (!source.empty() && reports_are_built()) write_report(context, out.path().string(), {source});
         context.throw_if_cancelled();
         out.commit();
@@ -325,7 +333,7 @@ VerifyResult write_and_verify(Context& context, const Plan& plan, const std::str
     return guarded([&] {
         check_cell(options.cell);
         OutputFolder out(directory);
-        fill(context, plan, out);
+        fill(context, plan, out.path());
         const bool reports = reports_are_built();
         const double verified = reports ? verifying_share(plan, options.cell) : 1;
         context.share_progress(kPlanningShare, verified);
@@ -361,7 +369,7 @@ VerifyResult write_proven(Context& context, Plan& plan, const std::string& direc
         SimulationMemory memory;  // what a round does not change is not simulated again
         options.memory = &memory;
         OutputFolder out(directory);
-        fill(context, plan, out);
+        fill(context, plan, out.path());
         const bool reports = reports_are_built();
         const double verified = reports ? verifying_share(plan, cell_mm) : 1;
         context.share_progress(kPlanningShare, verified);
@@ -373,11 +381,14 @@ VerifyResult write_proven(Context& context, Plan& plan, const std::string& direc
             context.share_progress(verified, verified);
             if (!replanner) replanner.emplace(context, found.pattern->read.mesh.view(), *found.pattern->part);
             const std::vector<LayerFaults> faults = faults_of(plan, found);
-            if (faults.empty()) break;
-            const std::vector<bool> other =
-                naming_file(pattern->place, [&] { return replanner->mend(plan, faults, round); });
-            fill(context, plan, out, other.empty() ? std::vector<bool>(plan.layers.size()) : other);
-            if (other.empty()) break;
+            const bool under =
+                naming_file(pattern->place, [&] { return mend_undersides(context, plan, found, round); });
+            if (faults.empty() && !under) break;
+            std::vector<bool> other;
+            if (!faults.empty())
+                other = naming_file(pattern->place, [&] { return replanner->mend(plan, faults, round); });
+            fill(context, plan, out.path(), other.empty() ? std::vector<bool>(plan.layers.size()) : other);
+            if (other.empty() && !under) break;
             memory.programs = std::move(found.input.programs);
             found = {};
             found = verify_folder(context, out.path().string(), options);

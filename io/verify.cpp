@@ -16,6 +16,8 @@
 #include "engine/simulate/dowel_proof.h"
 #include "engine/simulate/keep_out_check.h"
 #include "engine/simulate/planned_build.h"
+#include "engine/undersides/loose_pieces.h"
+#include "engine/undersides/underside_target.h"
 #include "io/posts/probe_check.h"
 #include "io/posts/program_check.h"
 #include "io/posts/tool_table_check.h"
@@ -27,6 +29,8 @@
 #include "io/write/output_file.h"
 #include "io/write/verify_json.h"
 #include "kernels/errors.h"
+#include "kernels/features/filled_columns.h"
+#include "kernels/features/unmade_air.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -258,8 +262,9 @@ void saw_by_list(const fs::path& file, const BuildPlan& build, std::vector<Viola
 
 /// Drills the slabs' undersides by the list of dowels; where the plan has none, there is no list.
 void drill_by_list(const fs::path& file, const BuildPlan& build, std::vector<Violation>& violations) {
-    const bool has_dowels = std::any_of(build.layers.begin(), build.layers.end(),
-                                        [](const LayerToBuild& layer) { return !layer.dowels.empty(); });
+    bool has_dowels = false;
+    for (std::size_t l = 0; l + 1 < build.layers.size(); ++l)
+        has_dowels |= !build.layers[l].dowels.empty() && !mills_underside(build, build.layers[l + 1].index);
     std::error_code error;
     const bool is_there = fs::is_regular_file(file, error);
     if (has_dowels && !is_there)
@@ -271,12 +276,171 @@ void drill_by_list(const fs::path& file, const BuildPlan& build, std::vector<Vio
     violations.insert(violations.end(), found.begin(), found.end());
 }
 
+/// What a proof goes by, of all programs of a folder.
+SimulationOptions simulation_options(const Job& job, const VerifyOptions& options,
+                                     const std::vector<Tool>& tools) {
+    SimulationOptions simulation;
+    simulation.cell = options.cell;
+    simulation.maps = options.maps || !options.maps_directory.empty();
+    simulation.faults = options.faults;
+    simulation.gouge = job.tolerances.gouge;
+    simulation.cusp = job.tolerances.cusp;
+    simulation.board_cut = board_cut_limit(job.machine, tools);
+    return simulation;
+}
+
+/// The slab that a layer of the plan is milled from below of, as the plan states it; the web and the room are
+/// the underside's own to choose.
+TurnedSlab slab_of(const BuildPlan& build, std::size_t layer, const TurnedSlab& stated) {
+    const LayerToBuild& from = build.layers[layer];
+    return {from.index,
+            from.z_bottom,
+            from.z_top,
+            from.slab_thickness,
+            from.blank.value_or(Blank{build.stock_min, build.stock_max}),
+            stated.web,
+            stated.room};
+}
+
+/// Whether an underside's plan is of that slab, and drills its dowels where they stand in the joint.
+void check_turned(const PlannedFolder& under, const TurnedSlab& slab, std::span<const JointDowel> dowels,
+                  std::vector<Violation>& found) {
+    constexpr double kSame = 1e-3;  // mm
+    const auto complain = [&](const char* code, const std::string& message, double size = 0) {
+        found.push_back({code, message, "plan.json", 0, {}, size});
+    };
+    const TurnedSlab& stated = *under.turned;
+    const auto differs = [](double a, double b) { return !(std::abs(a - b) <= kSame); };
+    bool other = stated.layer != slab.layer || differs(stated.z_bottom, slab.z_bottom) ||
+                 differs(stated.z_top, slab.z_top) || differs(stated.slab_thickness, slab.slab_thickness);
+    for (std::size_t k = 0; k < 2; ++k)
+        other |= differs(stated.blank.min[k], slab.blank.min[k]) ||
+                 differs(stated.blank.max[k], slab.blank.max[k]) || differs(under.build.stock_min[k], 0);
+    const std::vector<LayerToBuild>& layers = under.build.layers;
+    other |= differs(under.build.stock_max[0], slab.blank.length()) ||
+             differs(under.build.stock_max[1], slab.blank.width()) || layers.size() != 1 ||
+             differs(layers.front().z_bottom, 0) || differs(layers.front().z_top, slab.slab_thickness) ||
+             differs(layers.front().slab_thickness, slab.slab_thickness);
+    if (other) complain("underside.slab", "is of another slab than that which the plan lays");
+    if (!(slab.web >= 0) || slab.web >= slab.z_top - slab.z_bottom || !(slab.room >= 0))
+        complain("underside.slab", "leaves no web that a layer can have");
+    std::vector<JointDowel> due = turned_dowels(slab, dowels);
+    for (const JointDowel& made : layers.front().dowels) {
+        const auto at = std::find_if(due.begin(), due.end(), [&](const JointDowel& d) {
+            return !differs(d.x, made.x) && !differs(d.y, made.y) && !differs(d.diameter, made.diameter) &&
+                   !differs(d.below, made.below);
+        });
+        if (at != due.end()) due.erase(at);
+        else
+            complain("dowel.underside",
+                     fmt::format("drills a hole at x {:.3f} y {:.3f} mm, where no dowel of the joint stands",
+                                 made.x, made.y));
+    }
+    for (const JointDowel& missing : due)
+        complain("dowel.underside",
+                 fmt::format("drills no hole at x {:.3f} y {:.3f} mm for a dowel of the joint", missing.x,
+                             missing.y),
+                 missing.below);
+}
+
+/// Proves the programs that mill one slab from below, as those of any plan, on the target that follows from
+/// the pattern.
+UndersideFindings prove_underside(Context& context, const PlannedFolder& folder, std::size_t layer,
+                                  const UndersideToMill& planned, MeshView pattern,
+                                  const VerifyOptions& options, std::vector<Violation>& violations) {
+    const FolderRefusal refusal;
+    const fs::path path = folder.path / planned.folder;
+    const PlannedFolder under = read_planned_folder(path, refusal);
+    if (!under.turned)
+        throw Error(ErrorKind::verification, refusal.plan, "is no plan of a slab's underside",
+                    (path / "plan.json").string(), "plan again");
+    std::vector<Violation> found;
+    const TurnedSlab slab = slab_of(folder.build, layer, *under.turned);
+    UndersideFindings result{planned.layer, planned.folder, slab, {}, {}};
+    check_turned(under, slab,
+                 layer > 0 ? std::span<const JointDowel>(folder.build.layers[layer - 1].dowels)
+                           : std::span<const JointDowel>(),
+                 found);
+    SimulationInput input = under.simulation;
+    read_programs(context, under, refusal, input.programs, found);
+    find_strangers(under, found);
+    BuildPlan build = under.build;
+    set_heights(build, input.programs);
+    check_sequence(path / "sequence.json", build, found);
+    const Mesh target = underside_target(context, pattern, slab);
+    if (slab.web < kWholeWeb && !hangs_together(context, target, slab))
+        found.push_back({"underside.loose", "pieces of the slab come loose before it is laid", "", 0, {}, 0});
+    const StandingPart part(context, target.view());
+    input.mesh = target.view();
+    SimulationOptions simulation = simulation_options(folder.build.job, options, input.tools);
+    simulation.whole = false;
+    simulation.maps = false;
+    result.report = simulate(context, input, part, simulation);
+    const std::vector<Violation> dowels = check_dowels(context, input, part, -1);
+    found.insert(found.end(), dowels.begin(), dowels.end());
+    found.insert(found.end(), result.report.violations.begin(), result.report.violations.end());
+    result.report.violations = found;
+    result.programs = std::move(input.programs);
+    for (Violation& v : found) {
+        v.file = v.file.empty() ? planned.folder : planned.folder + "/" + v.file;
+        if (v.where)
+            v.message += fmt::format(" (on the turned slab at x {:.2f} y {:.2f} z {:.2f} mm)", (*v.where)[0],
+                                     (*v.where)[1], (*v.where)[2]);
+        v.where.reset();
+        v.layer.reset();
+    }
+    violations.insert(violations.end(), found.begin(), found.end());
+    return result;
+}
+
+/// What stays filled in the layers, some of which are milled from both sides.
+void measure_unmade(Context& context, MeshView pattern, const PlannedFolder& folder,
+                    const std::map<int, MilledLayer>& undersides, SimulationReport& report) {
+    const AirGaps gaps = air_gaps(context, pattern, filled_cell(pattern));
+    std::vector<MilledLayer> layers;
+    for (const LayerToBuild& layer : folder.build.layers) {
+        const auto under = undersides.find(layer.index);
+        layers.push_back(under != undersides.end() ? under->second
+                                                   : MilledLayer{layer.z_top, MilledFrom::above, 0});
+    }
+    const UnmadeAir left = unmade_air(context, gaps, layers);
+    for (std::size_t l = 0; l < layers.size() && l < report.layers.size(); ++l) {
+        if (layers[l].milled == MilledFrom::above) continue;
+        LayerFindings& f = report.layers[l];
+        f.unmade_mm3 = left.of_layers[l];
+        f.unmade = {};
+        for (const UnmadePocket& p : left.pockets)
+            if (p.layer == l && p.height_mm > f.unmade.size) f.unmade = {p.height_mm, p.at};
+    }
+}
+
+/// Proves the undersides of a plan's slabs; what they make is then not unmade.
+std::vector<UndersideFindings> prove_undersides(Context& context, const PlannedFolder& folder,
+                                                MeshView pattern, const VerifyOptions& options,
+                                                SimulationReport& report,
+                                                std::vector<Violation>& violations) {
+    std::vector<UndersideFindings> undersides;
+    std::map<int, MilledLayer> milled;
+    const std::vector<LayerToBuild>& layers = folder.build.layers;
+    for (const UndersideToMill& planned : folder.build.undersides)
+        for (std::size_t l = 0; l < layers.size(); ++l) {
+            if (layers[l].index != planned.layer) continue;
+            undersides.push_back(prove_underside(context, folder, l, planned, pattern, options, violations));
+            milled[planned.layer] = milled_layer(undersides.back().slab);
+        }
+    if (!milled.empty()) measure_unmade(context, pattern, folder, milled, report);
+    return undersides;
+}
+
 }  // namespace
 
 Verification verify_folder(Context& context, const std::string& directory, const VerifyOptions& options) {
     const fs::path out(directory);
     const FolderRefusal refusal;
     const PlannedFolder folder = read_planned_folder(out, refusal);
+    if (folder.turned)
+        throw Error(ErrorKind::verification, "verify.underside", "is the underside of a slab of another plan",
+                    (out / "plan.json").string(), "verify the folder that holds undersides/");
     const Job& job = folder.build.job;
 
     Verification result;
@@ -311,14 +475,9 @@ Verification verify_folder(Context& context, const std::string& directory, const
     input.mesh = pattern.read.mesh.view();
     if (!pattern.part) pattern.part.emplace(context, input.mesh);
 
-    SimulationOptions simulation;
-    simulation.cell = options.cell;
-    simulation.maps = options.maps || !options.maps_directory.empty();
-    simulation.faults = options.faults;
-    simulation.gouge = job.tolerances.gouge;
-    simulation.cusp = job.tolerances.cusp;
-    simulation.board_cut = board_cut_limit(job.machine, input.tools);
+    const SimulationOptions simulation = simulation_options(job, options, input.tools);
     result.report = simulate(context, input, *pattern.part, simulation, options.memory);
+    result.undersides = prove_undersides(context, folder, input.mesh, options, result.report, violations);
     const std::vector<Violation> dowels = check_dowels(context, input, *pattern.part, job.dowels.clearance);
     violations.insert(violations.end(), dowels.begin(), dowels.end());
     MissingToolOptions asked;
@@ -335,7 +494,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     input.mesh = {};
     result.report.violations.insert(result.report.violations.begin(), violations.begin(), violations.end());
     result.json = verify_json(input, result.report, simulation, fs::path(pattern.place).filename().string(),
-                              folder.build.job_stated, result.missing);
+                              folder.build.job_stated, result.missing, result.undersides);
 
     if (!options.maps_directory.empty()) write_maps(result.report, options.maps_directory);
     if (options.write) write_file_in(out, "verify.json", result.json);

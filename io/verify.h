@@ -8,6 +8,7 @@
 #include "engine/simulate/missing_tools.h"
 #include "engine/simulate/simulate.h"
 #include "io/read/pattern.h"
+#include "io/write/verify_json.h"
 
 namespace slabwright {
 
@@ -31,8 +32,9 @@ struct Verification {
     std::shared_ptr<Pattern> pattern;  ///< with its part
     SimulationInput input;             ///< its mesh is not set: pattern has it
     SimulationReport report;
-    std::vector<MissingTool> missing;  ///< tools that would reach what is out of reach
-    std::string json;                  ///< what verify.json holds (schema slabwright.verify/1)
+    std::vector<UndersideFindings> undersides;  ///< their violations stand in `report` too
+    std::vector<MissingTool> missing;           ///< tools that would reach what is out of reach
+    std::string json;                           ///< what verify.json holds (schema slabwright.verify/1)
 };
 
 /// Reads plan.json, every program of nc/, for LinuxCNC tool.tbl, sequence.json and, if it is not given, the

@@ -94,8 +94,7 @@ std::string ways_out_text(const WaysOut& ways) {
     for (const WayOutCommand& c : ways.commands)
         text += fmt::format("  {}\n    {}{}\n", c.command, leaves(c.way.outcome),
                             c.way.turn ? "" : " in both halves, to be planned one by one");
-    return text +
-           "on each side, slabs milled from above and, which no plan does, on both sides would leave\n" +
+    return text + "on each side, slabs milled from above, and on both sides (--sides two), would leave\n" +
            milled_ways_table(ways.milled);
 }
 

@@ -54,8 +54,8 @@ struct Options {
     PrepareOptions prepare;
     InspectionOptions inspection;
     std::string pdf;  ///< of the setup sheets; "": none
-    std::string orient, repair, stl, out, maps, access_maps, job_file, tools, units, strategy, finder, device,
-        post;
+    std::string orient, repair, stl, out, maps, access_maps, job_file, tools, units, strategy, sides, finder,
+        device, post;
     int threads = 0, plans = 3;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
     bool allow_undercut = false, accept_weak = false, no_verify = false, keep_failed = false, json = false,
@@ -77,6 +77,7 @@ Job job_of(const Options& options) {
     word("input.repair", options.repair);
     put("bonding.accept_weak", options.accept_weak ? "true" : "");
     word("layers.strategy", options.strategy);
+    word("layers.sides", options.sides);
     word("layers.finder", options.finder);
     put("tolerances.weld", options.weld_given ? fmt::format("{}", options.weld) : "");
     keys += prepare_keys(options.prepare);
@@ -376,6 +377,11 @@ CLI::App* add_plan_command(CLI::App& app, Options& options) {
     add_common(*command, options);
     command->add_option("--strategy", options.strategy, "of layer placement: optimal, printed or combined")
         ->check(CLI::IsMember({"optimal", "printed", "combined"}));
+    command
+        ->add_option("--sides", options.sides,
+                     "of slabs that are milled: one, the top; two, the underside too where there are "
+                     "overhangs; or auto, two where that makes more")
+        ->check(CLI::IsMember({"one", "two", "auto"}));
     command->add_option("--finder", options.finder, "of features: exact, halving or both")
         ->check(CLI::IsMember({"exact", "halving", "both"}));
     command

@@ -100,6 +100,10 @@ void leave_local_frame(Plan& plan, const std::array<double, 2>& by) {
         }
     for (ProbeProgram& probe : plan.probes)
         for (std::size_t k = 0; of_model && k < 2; ++k) probe.touches[k] += by[k];
+    for (Plan& under : plan.undersides) {  // all else of it counts from its slab's corner
+        move(under.turned->blank.min, by);
+        move(under.turned->blank.max, by);
+    }
     for (Diagnostic& d : plan.diagnostics)
         if (d.where) move(*d.where, by);
 }

@@ -378,6 +378,10 @@ double dowel_depth(const JointDowels& rules, double layer_mm) {
     return depth < rules.diameter / 2 ? 0 : depth;
 }
 
+double least_layer_for_dowels(const JointDowels& rules) {
+    return std::ceil(rules.diameter / 2 * 10) / 10 + kLeastWoodAtDowel + point_mm(rules.diameter);
+}
+
 std::array<double, 2> wood_around(const JointDowel& dowel, double z) {
     const double beyond = point_mm(dowel.diameter) + kLeastWoodAtDowel - kBesideEnds;
     return {z - dowel.below - beyond, z + dowel.above + beyond};
@@ -423,6 +427,10 @@ std::span<const JointDowel> dowels_under(const Plan& plan, const Layer& layer) {
 std::vector<UndersideHole> underside_holes(const Plan& plan) {
     std::vector<UndersideHole> holes;
     for (const Layer& layer : plan.layers) {
+        const bool by_program =
+            std::any_of(plan.undersides.begin(), plan.undersides.end(),
+                        [&](const Plan& under) { return under.turned->layer == layer.index; });
+        if (by_program) continue;
         const Blank slab = slab_of(plan, layer);
         int number = 0;
         for (const JointDowel& d : dowels_under(plan, layer))

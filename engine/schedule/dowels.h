@@ -24,6 +24,9 @@ inline constexpr double kLeastWoodAtDowel = 3;
 /// the layer leaves room for; 0 where that is less than half a diameter.
 [[nodiscard]] double dowel_depth(const JointDowels& rules, double layer_mm);
 
+/// The lowest layer that has room for a hole of half a diameter, mm.
+[[nodiscard]] double least_layer_for_dowels(const JointDowels& rules);
+
 /// The heights between which the wood around a dowel is looked at: its holes, the drill's points, and
 /// kLeastWoodAtDowel beyond these. @param z of the joint, mm
 [[nodiscard]] std::array<double, 2> wood_around(const JointDowel& dowel, double z);
@@ -55,7 +58,7 @@ struct UndersideHole {
     friend bool operator==(const UndersideHole&, const UndersideHole&) = default;
 };
 
-/// Of all layers, upwards, in the order of their dowels.
+/// Of all layers whose undersides no program mills, upwards, in the order of their dowels.
 [[nodiscard]] std::vector<UndersideHole> underside_holes(const Plan& plan);
 
 /// Fills Layer::dowels: for each joint between two layers `per_joint` dowels around which, for a radius and

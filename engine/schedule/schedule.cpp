@@ -99,14 +99,17 @@ void name_programs(Plan& plan) {
         for (std::size_t begin = 0, end = 0; begin < layer.operations.size(); begin = end) {
             end = span_end(layer, begin, machine.programs);
             const Operation& first = layer.operations[begin];
-            std::string stem = fmt::format("L{:0{}}", layer.index, layer_width);
+            std::string stem = fmt::format("{}{:0{}}", plan.turned ? 'B' : 'L', layer.index, layer_width);
             ++files;
             if (machine.programs != ProgramSpan::layer) stem += fmt::format("_{:0{}}", files, file_width);
             if (machine.programs == ProgramSpan::operation) stem += fmt::format("_{}", name(first.kind));
             if (machine.programs != ProgramSpan::layer) stem += fmt::format("_T{}", first.tool);
             // O0302 is layer 3's second, where all numbers fit below those of what is faced off again.
             ++running;
-            const int number = highest < 80 && most < 100 ? 100 * layer.index + files : running;
+            // Of its underside O0352, so that one control may hold both.
+            const int number = plan.turned                  ? 100 * (layer.index % 80) + 50 + files
+                               : highest < 80 && most < 100 ? 100 * layer.index + files
+                                                            : running;
             for (std::size_t i = begin; i < end; ++i) {
                 layer.operations[i].file = program_file(machine, stem);
                 if (end - begin > 1) layer.operations[i].file += fmt::format("#{}", i - begin + 1);
@@ -231,7 +234,15 @@ void schedule(Plan& plan) {
     };
 
     const int first_layer = plan.layers.empty() ? 0 : plan.layers.front().index;
-    SequenceStep& board = add(first_layer, "mount_board", {}, 0);
+    std::vector<int> slabs_turned;  // the step that turned the last of them
+    for (const Plan& under : plan.undersides) {
+        const double seconds = under.totals.build_minutes * 60, turning = job.bonding.handling_s / 3;
+        SequenceStep& mill = add(under.turned->layer, "mill_underside", slabs_turned, seconds);
+        mill.words = {{"sequence", underside_folder(under.turned->layer) + "/sequence.json"}};
+        slabs_turned = {add(under.turned->layer, "turn_over", {mill.id}, turning).id};
+        totals.underside_minutes += (seconds + turning) / 60;
+    }
+    SequenceStep& board = add(first_layer, "mount_board", slabs_turned, 0);
     board.numbers = {{"thickness_mm", job.machine.base_board_thickness},
                      {"length_mm", stock.length()},
                      {"width_mm", stock.width()},
@@ -279,7 +290,7 @@ void schedule(Plan& plan) {
     totals.magazine_swaps = runs.swaps();
     totals.magazine_minutes = runs.swaps() * job.machine.magazine_swap_s / 60;
     totals.build_minutes = totals.cutting_minutes + totals.bonding_minutes + totals.tool_change_minutes +
-                           totals.table_minutes + totals.magazine_minutes;
+                           totals.table_minutes + totals.magazine_minutes + totals.underside_minutes;
     totals.stack_mass_kg = (totals.stock_volume_mm3 + stock.mm2() * job.machine.base_board_thickness) * 1e-9 *
                            job.material.density_kg_m3;
     plan.totals = totals;

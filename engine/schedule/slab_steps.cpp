@@ -70,6 +70,11 @@ SequenceStep& SlabSteps::add(const Layer& layer, const char* action, std::vector
 int SlabSteps::bond(const Layer& layer, int k, int ready) {
     const Bonding& bonding = plan_.job.bonding;
     const Blank blank = slab_of(plan_, layer);
+    if (plan_.turned) {
+        const int slab = take(layer, layer.slab_thickness, blank);
+        const int lies = place(layer, 0, {ready, slab}, blank);
+        return add(layer, "hold_down", {lies}, bonding.handling_s / 3).id;
+    }
     const int taken = take(layer, layer.slab_thickness / layer.slabs, blank);
     const int clamped = add(layer, "clamp", {taken}, handled_ ? machine_.grip_s : bonding.handling_s / 3).id;
     const int glued = glue(layer, k, ready, clamped);
@@ -86,16 +91,26 @@ int SlabSteps::bond(const Layer& layer, int k, int ready) {
     return press.id;
 }
 
+int SlabSteps::turned_over(int layer) const {
+    for (const SequenceStep& step : plan_.sequence)
+        if (step.action == "turn_over" && step.layer == layer) return step.id;
+    return 0;
+}
+
 // Fetching the slab and clamping it only needs the handler; it may go on while the layer below is milled.
 int SlabSteps::take(const Layer& layer, double thickness, const Blank& blank) {
     std::vector<int> needs;
     if (feed_.is_empty()) {
-        SequenceStep& load =
-            add(layer, "load_feed", last_taken_ == 0 ? std::vector<int>{} : std::vector<int>{last_taken_}, 0);
+        std::vector<int> after;
+        if (last_taken_ != 0) after.push_back(last_taken_);
+        else if (!plan_.undersides.empty())
+            after.push_back(turned_over(plan_.undersides.back().turned->layer));
+        SequenceStep& load = add(layer, "load_feed", std::move(after), 0);
         feed_.load(load, machine_);
         needs.push_back(load.id);
     }
     if (handler_free_ != 0) needs.push_back(handler_free_);
+    if (const int turned = turned_over(layer.index); turned != 0) needs.push_back(turned);
     const double seconds =
         handled_ ? handler_seconds(machine_, handler_, 0) : plan_.job.bonding.handling_s / 3;
     SequenceStep& step = add(layer, "take_slab", std::move(needs), seconds);

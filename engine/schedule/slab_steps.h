@@ -57,6 +57,8 @@ public:
 private:
     SequenceStep& add(const Layer& layer, const char* action, std::vector<int> needs, double seconds);
     int take(const Layer& layer, double thickness, const Blank& blank);
+    /// The step that turned a layer's slab when its underside was milled; 0: it was not.
+    [[nodiscard]] int turned_over(int layer) const;
     int glue(const Layer& layer, int k, int ready, int clamped);
     /// Into the joint under a layer. @returns 0 where it has none
     int set_dowels(const Layer& layer, int glued);

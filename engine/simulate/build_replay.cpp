@@ -7,8 +7,8 @@
 #include <unordered_map>
 
 #include "engine/simulate/planned_build.h"
-#include "engine/simulate/probe_steps.h"
 #include "engine/simulate/step_order.h"
+#include "engine/simulate/underside_steps.h"
 
 namespace slabwright {
 
@@ -17,10 +17,10 @@ namespace {
 constexpr double kForce = 0.01;  // N and kg
 constexpr double kLitres = 0.01;
 
-class BuildReplay : ProbeSteps {
+class BuildReplay : UndersideSteps {
 public:
     BuildReplay(const BuildPlan& plan, const BuildSequence& sequence, BuildState from)
-        : ProbeSteps(plan, sequence.steps, std::move(from)), sequence_(sequence), slabs_(build_.slabs()) {
+        : UndersideSteps(plan, sequence.steps, std::move(from)), sequence_(sequence), slabs_(build_.slabs()) {
         s_.ran_in.resize(plan.programs.size());
         s_.faced_off.resize(plan.face_offs.size());
         programs_left_.resize(plan.layers.size());
@@ -50,11 +50,6 @@ public:
     }
 
 private:
-    /// Seconds that only the job can tell.
-    void expect_job_seconds(double planned) {
-        if (plan_.job_stated) expect_seconds(planned, kSeconds);
-    }
-
     // --- the steps
 
     void check_head() {
@@ -62,7 +57,7 @@ private:
             complain("sequence.pattern", "is made for another pattern than plan.json");
         if (sequence_.frame != plan_.frame)
             complain("sequence.frame", "counts its heights in another frame than plan.json");
-        for (std::size_t l = 0; l < plan_.layers.size(); ++l)
+        for (std::size_t l = 0; l < plan_.layers.size() && !plan_.turned; ++l)
             if (l >= sequence_.glue.size() || sequence_.glue[l].layer != plan_.layers[l].index)
                 complain("sequence.glue",
                          fmt::format("glue/{} is not that of layer {}", l, plan_.layers[l].index));
@@ -70,25 +65,29 @@ private:
 
     void replay_step() {
         using Act = void (BuildReplay::*)();
-        static const std::unordered_map<std::string, Act> acts{{"mount_board", &BuildReplay::mount_board},
-                                                               {"load_feed", &BuildReplay::load_feed},
-                                                               {"take_slab", &BuildReplay::take_slab},
-                                                               {"clamp", &BuildReplay::clamp},
-                                                               {"glue", &BuildReplay::glue},
-                                                               {"set_dowels", &BuildReplay::set_dowels},
-                                                               {"place", &BuildReplay::place},
-                                                               {"press", &BuildReplay::press},
-                                                               {"table", &BuildReplay::table},
-                                                               {"touch_off", &BuildReplay::touch_off},
-                                                               {"probe", &BuildReplay::probe},
-                                                               {"tool_change", &BuildReplay::tool_change},
-                                                               {"load_tool", &BuildReplay::load_tool},
-                                                               {"face", &BuildReplay::program},
-                                                               {"mill", &BuildReplay::program},
-                                                               {"clear", &BuildReplay::clear},
-                                                               {"face_off", &BuildReplay::face_off},
-                                                               {"unload", &BuildReplay::unload},
-                                                               {"mould_box", &BuildReplay::mould_box}};
+        static const std::unordered_map<std::string, Act> acts{
+            {"mill_underside", &BuildReplay::mill_underside},
+            {"turn_over", &BuildReplay::turn_over},
+            {"hold_down", &BuildReplay::hold_down},
+            {"mount_board", &BuildReplay::mount_board},
+            {"load_feed", &BuildReplay::load_feed},
+            {"take_slab", &BuildReplay::take_slab},
+            {"clamp", &BuildReplay::clamp},
+            {"glue", &BuildReplay::glue},
+            {"set_dowels", &BuildReplay::set_dowels},
+            {"place", &BuildReplay::place},
+            {"press", &BuildReplay::press},
+            {"table", &BuildReplay::table},
+            {"touch_off", &BuildReplay::touch_off},
+            {"probe", &BuildReplay::probe},
+            {"tool_change", &BuildReplay::tool_change},
+            {"load_tool", &BuildReplay::load_tool},
+            {"face", &BuildReplay::program},
+            {"mill", &BuildReplay::program},
+            {"clear", &BuildReplay::clear},
+            {"face_off", &BuildReplay::face_off},
+            {"unload", &BuildReplay::unload},
+            {"mould_box", &BuildReplay::mould_box}};
         const auto act = acts.find(step().action);
         if (act == acts.end()) {
             complain("sequence.action", "is no action of this machine");
@@ -106,6 +105,7 @@ private:
 
     void mount_board() {
         if (s_.board) complain("sequence.order", "a board is mounted already");
+        require_all_turned();
         expect_layer(0);
         expect_seconds(0, kSeconds);
         expect_size({plan_.stock_min, plan_.stock_max});
@@ -134,6 +134,7 @@ private:
             complain("sequence.feed", fmt::format("{} slabs still lie in the feed chamber", s_.in_feed));
         if (s_.taken < slabs_.size()) expect_layer(slabs_[s_.taken].layer);
         wait_for(s_.last_taken);
+        require_all_turned();
         const int count = whole("slabs").value_or(0);
         if (count < 1 || static_cast<std::size_t>(count) > slabs_.size() - std::min(s_.taken, slabs_.size()))
             complain("sequence.feed", fmt::format("loads {} slabs where the build still takes {}", count,
@@ -191,6 +192,7 @@ private:
         } else {
             const DueSlab& slab = slabs_[s_.taken];
             expect_layer(slab.layer);
+            require_turned(plan_.layers[slab.layer].index);
             expect_size(slab.blank);
             expect("sequence.slab", "thickness_mm", slab.thickness, kLength);
             if (plan_.job_stated) expect("sequence.mass", "mass_kg", slab.kg, kForce);
@@ -284,8 +286,11 @@ private:
         if (s_.placed >= slabs_.size()) complain("sequence.order", "all slabs of the build are placed");
         expect_layer(slab.layer);
         require(s_.in_hand, "the material handler holds no slab");
-        require(s_.clamped, "the slab is not clamped");
-        require(s_.glued, "there is no glue on the stack");
+        if (plan_.turned) require(s_.stack_ready, "no board is mounted");
+        else {
+            require(s_.clamped, "the slab is not clamped");
+            require(s_.glued, "there is no glue on the stack");
+        }
         if (!dowels_of(slab).empty()) require(s_.dowels, "its dowels are not set");
         expect("sequence.place", "x_mm", slab.blank.min[0], kLength);
         expect("sequence.place", "y_mm", slab.blank.min[1], kLength);
@@ -308,6 +313,7 @@ private:
     }
 
     void press() {
+        if (plan_.turned) complain("sequence.action", "is no action of this build");
         require(s_.to_press, "no slab waits for the press");
         if (s_.placed > 0) {
             const DueSlab& slab = slabs_[s_.placed - 1];
@@ -564,6 +570,7 @@ private:
         if (s_.placed < slabs_.size())
             complain("sequence.missing", fmt::format("{} of {} slabs are never placed",
                                                      slabs_.size() - s_.placed, slabs_.size()));
+        check_undersides_at_end();
         for (std::size_t p = 0; p < plan_.programs.size(); ++p)
             if (!s_.ran_in[p])
                 complain("sequence.missing", fmt::format("{} is never run", plan_.programs[p].file));

@@ -54,6 +54,13 @@ struct PlannedProbe {
     int tool = 0;
 };
 
+/// A slab's underside that is milled before the build, as the plan states it.
+struct UndersideToMill {
+    int layer = 0;                  ///< LayerToBuild::index
+    std::string folder;             ///< of its own plan and sequence, from the plan's
+    std::optional<double> minutes;  ///< none: not stated
+};
+
 /// What a sequence has to build.
 struct BuildPlan {
     Job job;                  ///< of it machine, material and bonding
@@ -70,7 +77,13 @@ struct BuildPlan {
     std::vector<Tool> tools;
     bool flask = false;
     std::optional<double> flask_mass_kg, sand_litres;
+    std::vector<UndersideToMill> undersides{};  ///< ascending by layer
+    bool turned = false;  ///< it is a slab's underside: the slab is held on the board, not bonded
 };
+
+/// Whether the underside of a layer's slab is milled, its dowel holes with it. @param layer index as the plan
+/// states it
+[[nodiscard]] bool mills_underside(const BuildPlan& plan, int layer);
 
 /// Where glue goes on one joint, as the sequence states it: under each layer first, in their order.
 struct StatedGlue {

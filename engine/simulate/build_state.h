@@ -34,7 +34,8 @@ struct BuildState {
            highest = -std::numeric_limits<double>::infinity();  ///< mm, of the spindle so far
     std::vector<int> magazine;        ///< the tool in each of its places, 0 for none; empty: no magazine
     std::vector<Cause> magazine_set;  ///< the step that put each of them in
-    std::vector<Cause> ran_in;     ///< of each program of the plan, the step in which it ran on what stands
+    std::vector<Cause> ran_in;  ///< of each program of the plan, the step in which it ran on what stands
+    std::vector<Cause> undersides_milled, slabs_turned;  ///< of each underside of the plan
     std::vector<Cause> faced_off;  ///< of each program that faces a layer off, the step in which it ran
 
     friend bool operator==(const BuildState&, const BuildState&) = default;

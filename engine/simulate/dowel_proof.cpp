@@ -100,7 +100,7 @@ public:
             const std::vector<MadeHole> holes = holes_of(l);
             for (const JointDowel& dowel : input_.layers[l].dowels) {
                 check_hole(l, dowel, holes, found[l]);
-                check_wood(l, dowel, found[l]);
+                if (clearance_ >= 0) check_wood(l, dowel, found[l]);
             }
         });
         std::vector<Violation> all;

@@ -34,7 +34,7 @@ void fill_dowels(Stock& stock, const SimulatedLayer& layer);
 /// there), dowel.place, dowel.diameter, dowel.depth (by more than kDowelTolerance), dowel.rapid (a rapid goes
 /// down in it deeper than was cut before), dowel.wood (a surface of the pattern comes nearer than the
 /// clearance, kDowelTolerance less, a hole ends outside of its slab, or two of one slab meet).
-/// @param clearance mm of wood around a hole
+/// @param clearance mm of wood around a hole; negative: what is around it is not looked at
 /// @throws Error(cancelled)
 [[nodiscard]] std::vector<Violation> check_dowels(Context& context, const SimulationInput& input,
                                                   const StandingPart& part, double clearance);

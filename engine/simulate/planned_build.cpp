@@ -35,7 +35,7 @@ std::size_t PlannedBuild::most_steps() const {
     // A program may have a change of tool and a load of the magazine before it; its places are filled too.
     const auto places = static_cast<std::size_t>(plan_.job_stated ? plan_.job.machine.magazine : 0);
     return builds * (kStepsEach * (slabs_.size() + 2) + 3 * programs + places) +
-           3 * builds * plan_.probes.size();
+           3 * builds * plan_.probes.size() + 2 * plan_.undersides.size();
 }
 
 double PlannedBuild::board_mass(double thickness) const {

@@ -47,6 +47,7 @@ struct SimulationOptions {
     double leftover_limit = 0.5;    ///< mm that nothing reachable may exceed
     double leftover_share = 0.999;  ///< of the surface must be within cusp + slack, of what is reachable
     double board_cut = -1;          ///< mm allowed into the base board; negative: not limited
+    bool whole = true;              ///< the layers are to hold the whole part
     bool faults = false;            ///< list every faulty motion and every place where something is left
     bool maps = false;  ///< keep left-over, gouge and kind of every point, LayerFindings::map and kinds
 };

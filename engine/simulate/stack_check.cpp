@@ -13,13 +13,13 @@ void check_stack(const SimulationStage& stage, SimulationReport& report) {
     const Box3 box = stage.part.box();
     const double tolerance = 10 * StandingPart::kSheet;
     const double over = box.max.z - stage.input.layers.back().z_top;
-    if (over > tolerance)
+    if (over > tolerance && stage.options.whole)
         violate(report, "stack.short", fmt::format("the layers end {:.3f} mm below the pattern's top", over),
                 nullptr, 0, Point3{box.max.x, box.max.y, box.max.z}, over);
     const double beyond =
         std::max({stage.input.stock_min[0] - box.min.x, stage.input.stock_min[1] - box.min.y,
                   box.max.x - stage.input.stock_max[0], box.max.y - stage.input.stock_max[1]});
-    if (beyond > tolerance)
+    if (beyond > tolerance && stage.options.whole)
         violate(report, "stack.narrow", fmt::format("the pattern reaches {:.3f} mm past the slabs", beyond),
                 nullptr, 0, {}, beyond);
     double below = 0;

@@ -283,8 +283,13 @@ std::string head_text(const Plan& plan, const Layer& layer, const Operation& ope
     const auto comment = [&](const std::string& line) { text += comment_line(dialect, line); };
     comment(fmt::format("Slabwright {}: {}", SLABWRIGHT_VERSION, file_of(operation.file)));
     comment(fmt::format("pattern {}", plan.input.file));
-    comment(fmt::format("layer {} of {}, z {} to {} mm from the pattern's bottom", layer.index,
-                        plan.layers.size(), rounded_text(layer.z_bottom, 4), rounded_text(layer.z_top, 4)));
+    if (plan.turned)
+        comment(fmt::format("side bottom of layer {}: the slab lies upside down, turned from left to right",
+                            layer.index));
+    else
+        comment(fmt::format("layer {} of {}, z {} to {} mm from the pattern's bottom", layer.index,
+                            plan.layers.size(), rounded_text(layer.z_bottom, 4),
+                            rounded_text(layer.z_top, 4)));
     comment(fmt::format("z = 0 at {}", height_words(frame_of(plan.job.machine))));
     if (const std::string at = zero_words(plan.job.machine); !at.empty()) comment("x = y = 0 at " + at);
     for (const std::string& line : remarks(operation, tool)) comment(line);

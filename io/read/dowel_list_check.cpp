@@ -51,7 +51,8 @@ std::vector<Violation> check_dowel_list(std::string_view text, const BuildPlan& 
     std::vector<Standing> standing;
     for (std::size_t l = 0; l + 1 < build.layers.size(); ++l)
         for (const JointDowel& dowel : build.layers[l].dowels)
-            standing.push_back({build.layers[l + 1].index, dowel});
+            if (const int above = build.layers[l + 1].index; !mills_underside(build, above))
+                standing.push_back({above, dowel});
     for (std::size_t at = 0; at < text.size();) {
         const std::size_t end = std::min(text.find('\n', at), text.size());
         const std::string_view words = text.substr(at, end - at);

@@ -405,6 +405,26 @@ std::vector<JointDowel> read_dowels(const Field& all) {
     return dowels;
 }
 
+void read_underside(const Field& underside, int layer, BuildPlan& build) {
+    build.undersides.push_back({layer, underside["folder"].text(), underside["minutes"].number()});
+    if (build.undersides.back().folder != underside_folder(layer))
+        underside["folder"].fail("is not that of the layer");
+}
+
+/// What a plan says of the slab whose underside it is of; none where it is of a build.
+std::optional<TurnedSlab> read_turned(const Field& plan) {
+    if (!plan.has("turned")) return std::nullopt;
+    const Field from = plan["turned"];
+    const auto mm = [&](const char* key) { return from[key].number(); };
+    TurnedSlab slab{
+        from["layer"].whole(), mm("z_bottom"), mm("z_top"), mm("slab_thickness"), {}, mm("web"), mm("room")};
+    for (std::size_t k = 0; k < 2; ++k) {
+        slab.blank.min[k] = from["min"][k].number();
+        slab.blank.max[k] = from["max"][k].number();
+    }
+    return slab;
+}
+
 void read_layers(const Field& layers, PlannedFolder& folder) {
     std::set<std::string> named;
     if (layers.size() == 0) layers.fail("has no layer");
@@ -420,6 +440,7 @@ void read_layers(const Field& layers, PlannedFolder& folder) {
         folder.simulation.layers.back().blank = layer.blank;
         if (from.has("dowels")) layer.dowels = read_dowels(from["dowels"]);
         folder.simulation.layers.back().dowels = layer.dowels;
+        if (from.has("underside")) read_underside(from["underside"], layer.index, folder.build);
         if (from.has("slabs")) layer.slabs = from["slabs"].whole();
         if (layer.slabs < 1 || layer.slabs > 1000) from["slabs"].fail("is no count of slabs");
         if (from.has("joints"))
@@ -532,6 +553,8 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
     for (std::size_t i = 0; i < tools.size(); ++i) build.tools.push_back(read_tool(tools[i]));
     read_layers(plan["layers"], folder);
     read_probes(plan, build);
+    folder.turned = read_turned(plan);
+    build.turned = folder.turned.has_value();
     folder.states_wood = plan.has("wood");
     SimulationInput& input = folder.simulation;
     input.machine = build.job.machine;

@@ -30,7 +30,8 @@ struct PlannedFolder {
     BuildPlan build;             ///< its job, layers and programs; of these low and high are not set
     SimulationInput simulation;  ///< stock, layers with what of the flask stands in them, tools, machine;
                                  ///< neither mesh nor programs
-    bool states_wood = false;    ///< whether a cut list goes with it
+    std::optional<TurnedSlab> turned;              ///< of a slab's underside
+    bool states_wood = false;                      ///< whether a cut list goes with it
     std::vector<ProgramPlan> sayings;              ///< what the plan says of each of build.programs
     std::vector<std::optional<double>> stepdowns;  ///< mm, of each of build.programs
 

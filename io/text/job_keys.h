@@ -22,6 +22,8 @@ inline constexpr Word<LayerStrategy> kStrategyWords[] = {{"printed", LayerStrate
                                                          {"uniform", LayerStrategy::uniform}};
 inline constexpr Word<SupportRule> kSupportWords[] = {{"none", SupportRule::none},
                                                       {"auto", SupportRule::automatic}};
+inline constexpr Word<SlabSides> kSidesWords[] = {
+    {"one", SlabSides::one}, {"two", SlabSides::two}, {"auto", SlabSides::automatic}};
 inline constexpr Word<Finder> kFinderWords[] = {
     {"halving", Finder::halving}, {"exact", Finder::exact}, {"both", Finder::both}};
 inline constexpr Word<FinishStrategy> kFinishWords[] = {{"split", FinishStrategy::split},
@@ -360,6 +362,14 @@ void visit_dowel_keys(DowelsLike& dowels, Visit& visit) {
     visit.key("set_s", dowels.set_s, "s, to set one by hand");
 }
 
+template <class LayersLike, class Visit>
+void visit_sides_key(LayersLike& layers, Visit& visit) {
+    if (shows(visit, layers.sides != SlabSides::one))
+        visit.word("sides", layers.sides, kSidesWords,
+                   "one: slabs are milled from above; two: under overhangs from below too, before they are "
+                   "turned and laid; auto: two where that makes more");
+}
+
 /// Walks every key that any plan has: all of visit_job_keys but those of dowels.
 template <class JobLike, class Visit>
 void visit_plain_job_keys(JobLike& job, Visit& visit) {
@@ -411,6 +421,7 @@ void visit_plain_job_keys(JobLike& job, Visit& visit) {
     visit.word("strategy", job.layers.strategy, kStrategyWords,
                "optimal, printed (LUO 4.2.5), combined: slabs bonded to any thickness, whatever is built "
                "fastest (LUO 6.4.2), or uniform: as thick as they may be, for comparing");
+    visit_sides_key(job.layers, visit);
     visit.word(
         "supports", job.layers.supports, kSupportWords,
         "auto: columns of stock stay under what nothing of the pattern carries, to be sawn off; or none");

@@ -40,6 +40,7 @@ constexpr std::string_view kPartial = "partial", kOld = "old";
 constexpr std::array<std::string_view, 11> kFiles{
     kOwnPostFile,  "plan.json",     "tool.tbl",     "sequence.json", "report.html", "verify.json",
     "sheets.json", "assembly.html", "cut_list.csv", "cut_list.dxf",  "dowels.csv"};
+constexpr std::string_view kUndersides = "undersides";  ///< the folder of the plans of slabs' undersides
 /// Its folders, and how the names in them end.
 struct Inner {
     std::string_view folder, ending;
@@ -109,9 +110,35 @@ bool is_program_name(const std::string& name) {
 
 /// The first entry of a folder that a plan folder cannot hold. @param is_program of names in inner folders
 template <class IsProgram>
+std::optional<Stranger> stranger_in(const fs::path& folder, IsProgram&& is_program);
+
+/// The same of the folder that holds the plans of undersides: "L003", each a folder of ours.
+template <class IsProgram>
+std::optional<Stranger> stranger_in_undersides(const fs::path& folder, IsProgram&& is_program) {
+    for (const fs::directory_entry& entry : entries_of(folder)) {
+        const std::string name = entry.path().filename().string();
+        const bool is_named = name.size() > 1 && name.front() == 'L' &&
+                              name.find_first_not_of("0123456789", 1) == std::string::npos;
+        if (!is_named) return Stranger{fs::path(kUndersides) / name, ""};
+        if (const auto what = not_a(entry, fs::file_type::directory))
+            return Stranger{fs::path(kUndersides) / name, *what};
+        if (auto stranger = stranger_in(entry.path(), is_program)) {
+            stranger->name = fs::path(kUndersides) / name / stranger->name;
+            return stranger;
+        }
+    }
+    return std::nullopt;
+}
+
+template <class IsProgram>
 std::optional<Stranger> stranger_in(const fs::path& folder, IsProgram&& is_program) {
     for (const fs::directory_entry& entry : entries_of(folder)) {
         const std::string name = entry.path().filename().string();
+        if (name == kUndersides) {
+            if (const auto what = not_a(entry, fs::file_type::directory)) return Stranger{name, *what};
+            if (auto stranger = stranger_in_undersides(entry.path(), is_program)) return stranger;
+            continue;
+        }
         const bool programs = std::any_of(kInner.begin(), kInner.end(),
                                           [&](const Inner& inner) { return name == inner.folder; });
         if (!programs && !is_file_of_ours(name)) return Stranger{name, ""};
@@ -161,6 +188,13 @@ std::optional<std::set<std::string>> programs_of(const fs::path& plan) {
         if (document.contains("probes"))
             for (const json& probe : document.at("probes"))
                 names.insert(fs::path(probe.at("file").get<std::string>()).filename().string());
+        for (const json& layer : document.at("layers")) {
+            if (!layer.contains("underside")) continue;
+            const fs::path folder = layer.at("underside").at("folder").get<std::string>();
+            if (const auto of_underside = programs_of(plan.parent_path() / folder.parent_path().filename() /
+                                                      folder.filename() / plan.filename()))
+                names.insert(of_underside->begin(), of_underside->end());
+        }
         return names;
     } catch (const json::exception&) {
         return std::nullopt;

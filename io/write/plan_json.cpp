@@ -246,6 +246,24 @@ void put_dowels(JsonText& json, const std::vector<JointDowel>& dowels) {
     json.end();
 }
 
+void put_underside(JsonText& json, const Plan& under) {
+    json.key("underside").begin_object(Shape::line);
+    json.key("folder").string(underside_folder(under.turned->layer));
+    json.key("minutes").rounded(under.totals.build_minutes, kMinutes).end();
+}
+
+void put_turned(JsonText& json, const TurnedSlab& slab) {
+    json.key("turned").begin_object(Shape::line);
+    json.key("layer").integer(slab.layer);
+    json.key("z_bottom").exact(slab.z_bottom).key("z_top").exact(slab.z_top);
+    json.key("slab_thickness").exact(slab.slab_thickness);
+    json.key("min");
+    put_xy(json, slab.blank.min);
+    json.key("max");
+    put_xy(json, slab.blank.max);
+    json.key("web").exact(slab.web).key("room").exact(slab.room).end();
+}
+
 void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
     json.begin_object();
     json.key("index").integer(layer.index);
@@ -283,6 +301,8 @@ void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
     }
     json.end();
     if (!layer.dowels.empty()) put_dowels(json, layer.dowels);
+    for (const Plan& under : plan.undersides)
+        if (under.turned->layer == layer.index) put_underside(json, under);
     json.key("operations").begin_array();
     std::uint32_t lines = 0;  // of the program so far that the operation is a part of
     for (const Operation& operation : layer.operations) {
@@ -332,6 +352,8 @@ void put_totals(JsonText& json, const Totals& totals) {
     json.key("tool_change_minutes").rounded(totals.tool_change_minutes, kMinutes);
     json.key("table_minutes").rounded(totals.table_minutes, kMinutes);
     json.key("magazine_minutes").rounded(totals.magazine_minutes, kMinutes);
+    if (totals.underside_minutes > 0)
+        json.key("underside_minutes").rounded(totals.underside_minutes, kMinutes);
     json.key("build_minutes").rounded(totals.build_minutes, kMinutes);
     json.key("stock_volume_mm3").rounded(totals.stock_volume_mm3, kArea);
     json.key("part_volume_mm3").rounded(totals.part_volume_mm3, kArea);
@@ -461,6 +483,7 @@ std::string plan_json(const Plan& plan) {
     json.key("max");
     put_xy(json, plan.stock_max);
     json.end();
+    if (plan.turned) put_turned(json, *plan.turned);
     const Point2 zero = work_zero(plan);
     json.key("zero").begin_array(Shape::line).units(zero.x).units(zero.y).end();
     json.key("flask");
@@ -497,11 +520,13 @@ std::string plan_json(const Plan& plan) {
     }
     json.key("totals");
     put_totals(json, plan.totals);
-    const CutList list = cut_list(plan);
-    json.key("wood");
-    put_wood(json, list, cut_list(plan, Blanks::pattern));
-    json.key("cost");
-    put_cost(json, plan.job, cost_of(plan.job, amounts_of(plan, list)));
+    if (!plan.turned) {  // the wood of an underside is counted where its slab is laid
+        const CutList list = cut_list(plan);
+        json.key("wood");
+        put_wood(json, list, cut_list(plan, Blanks::pattern));
+        json.key("cost");
+        put_cost(json, plan.job, cost_of(plan.job, amounts_of(plan, list)));
+    }
     json.key("diagnostics");
     put_diagnostics(json, plan.diagnostics);
     json.end();

@@ -42,11 +42,36 @@ void put_missing(JsonText& text, const std::vector<MissingTool>& missing) {
     text.end();
 }
 
+void put_undersides(JsonText& text, const std::vector<UndersideFindings>& undersides) {
+    if (undersides.empty()) return;
+    text.key("undersides").begin_array();
+    for (const UndersideFindings& under : undersides) {
+        const SimulationReport& r = under.report;
+        double left = 0, missed = 0;
+        for (const LayerFindings& f : r.layers) {
+            left = std::max(left, f.left.size);
+            missed = std::max(missed, f.missed_left.size);
+        }
+        text.begin_object(JsonText::Shape::line);
+        text.key("layer").integer(under.layer).key("folder").string(under.folder);
+        text.key("gouge_max_mm").rounded(r.gouge_max, 5);
+        text.key("left_over_max_mm").rounded(left, 4);
+        text.key("left_over_missed_max_mm").rounded(missed, 4);
+        text.key("unreachable_mm2").rounded(r.unreachable_mm2(), 1);
+        text.key("removed_mm3").rounded(r.removed_mm3, 0);
+        text.key("cutting_mm").rounded(r.cutting_mm, 1);
+        text.key("rapid_mm").rounded(r.rapid_mm, 1);
+        text.key("minutes").rounded(r.seconds / 60, 2).end();
+    }
+    text.end();
+}
+
 }  // namespace
 
 std::string verify_json(const SimulationInput& input, const SimulationReport& r,
                         const SimulationOptions& options, const std::string& pattern, bool job_stated,
-                        const std::vector<MissingTool>& missing) {
+                        const std::vector<MissingTool>& missing,
+                        const std::vector<UndersideFindings>& undersides) {
     JsonText text;
     text.begin_object();
     text.key("schema").string("slabwright.verify/1");
@@ -179,6 +204,7 @@ std::string verify_json(const SimulationInput& input, const SimulationReport& r,
             .end();
     }
     text.end();
+    put_undersides(text, undersides);
     text.end();
     return text.take();
 }

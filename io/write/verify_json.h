@@ -9,10 +9,21 @@
 
 namespace slabwright {
 
+/// What was found about a slab's underside.
+struct UndersideFindings {
+    int layer = 0;       ///< Layer::index
+    std::string folder;  ///< within OUT
+    TurnedSlab slab;     ///< as the build lays it
+    SimulationReport report;
+    std::vector<Program> programs;  ///< that it is of
+};
+
 /// @param pattern the file's name. @param job_stated whether plan.json says by which limits it is judged
 /// @param missing tools that would reach what is out of reach, `missing_tools` in the document
+/// @param undersides of slabs; none: the document has no such key
 [[nodiscard]] std::string verify_json(const SimulationInput& input, const SimulationReport& report,
                                       const SimulationOptions& options, const std::string& pattern,
-                                      bool job_stated, const std::vector<MissingTool>& missing = {});
+                                      bool job_stated, const std::vector<MissingTool>& missing = {},
+                                      const std::vector<UndersideFindings>& undersides = {});
 
 }  // namespace slabwright

@@ -24,11 +24,16 @@ struct Kept {
     [[nodiscard]] double height() const { return high - low; }
 };
 
-bool is_kept(const AirGap& gap, std::span<const double> borders, MilledFrom milled, Kept& kept) {
+// @param layers between the borders; @param y of the line
+bool is_kept(const AirGap& gap, std::span<const double> borders, std::span<const MilledLayer> layers,
+             double y, Kept& kept) {
     const auto above = std::upper_bound(borders.begin(), borders.end(), gap.high);
     if (above == borders.begin() || above == borders.end() || *above - gap.high <= kLeastGap) return false;
-    const double bottom = *(above - 1);
-    if (milled == MilledFrom::both_sides && (!gap.has_floor || bottom >= gap.low - kLeastGap)) return false;
+    double bottom = *(above - 1);
+    const auto at = static_cast<std::size_t>(above - borders.begin() - 1);
+    const MilledLayer layer = at < layers.size() ? layers[at] : MilledLayer{};
+    if (layer.milled == MilledFrom::both_sides && (!gap.has_floor || bottom >= gap.low - kLeastGap))
+        bottom = layer.web > 0 ? std::max(bottom, layer.top - layer.web_at(y)) : HUGE_VAL;
     kept = {gap.column, static_cast<std::uint32_t>(above - borders.begin() - 1), std::max(bottom, gap.low),
             gap.high};
     return kept.height() > kLeastGap;
@@ -108,6 +113,12 @@ private:
 
 }  // namespace
 
+double MilledLayer::web_at(double y) const {
+    if (!(strip_pitch > 0)) return web;
+    const double turns = (y - front) / strip_pitch, beside = std::abs(turns - std::floor(turns) - 0.5);
+    return beside * strip_pitch <= strip_width / 2 ? web : film;
+}
+
 AirGaps air_gaps(Context& context, MeshView mesh, double cell) {
     AirGaps gaps;
     const Box3 box = bounds(context, mesh);
@@ -139,6 +150,14 @@ AirGaps air_gaps(Context& context, MeshView mesh, double cell) {
 
 UnmadeAir unmade_air(Context& context, const AirGaps& gaps, std::span<const double> layer_tops,
                      MilledFrom milled) {
+    std::vector<MilledLayer> layers;
+    for (const double top : layer_tops) layers.push_back({top, milled, 0});
+    return unmade_air(context, gaps, layers);
+}
+
+UnmadeAir unmade_air(Context& context, const AirGaps& gaps, std::span<const MilledLayer> layers) {
+    std::vector<double> layer_tops;
+    for (const MilledLayer& layer : layers) layer_tops.push_back(layer.top);
     const std::vector<double> borders = layer_borders(gaps.bottom, layer_tops);
     UnmadeAir air;
     air.of_layers.assign(borders.size() - 1, 0);
@@ -146,7 +165,9 @@ UnmadeAir unmade_air(Context& context, const AirGaps& gaps, std::span<const doub
     parallel_for(context, rows.size(), kRows, [&](std::size_t begin, std::size_t end) {
         for (std::size_t row = begin; row < end; ++row)
             for (const AirGap& gap : gaps.rows[row])
-                if (Kept kept; is_kept(gap, borders, milled, kept)) rows[row].push_back(kept);
+                if (Kept kept; is_kept(gap, borders, layers,
+                                       gaps.grid.y0 + static_cast<double>(row) * gaps.grid.cell, kept))
+                    rows[row].push_back(kept);
     });
     const double area = gaps.grid.cell * gaps.grid.cell;
     std::array<double, 4> quarters{};

@@ -76,4 +76,21 @@ struct UnmadeAir {
 [[nodiscard]] UnmadeAir unmade_air(Context& context, const AirGaps& gaps, std::span<const double> layer_tops,
                                    MilledFrom milled);
 
+/// A layer as it is milled.
+struct MilledLayer {
+    double top = 0;  ///< mm
+    MilledFrom milled = MilledFrom::above;
+    double web = 0;  ///< mm under its top that are not milled from below
+    /// Where `strip_pitch` is over 0 the web comes in strips along x, `strip_width` wide, the middle of the
+    /// first half a pitch behind y = `front`; between them `film` mm are not milled from below. mm
+    double strip_pitch = 0, strip_width = 0, front = 0, film = 0;
+    /// mm that are not milled from below at y
+    [[nodiscard]] double web_at(double y) const;
+};
+
+/// The same of layers that are not milled alike. Where a layer is milled on both sides, that air too stays
+/// that has solid of the layer above it and lies in its web.
+[[nodiscard]] UnmadeAir unmade_air(Context& context, const AirGaps& gaps,
+                                   std::span<const MilledLayer> layers);
+
 }  // namespace slabwright

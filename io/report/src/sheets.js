@@ -4,6 +4,7 @@ import {duration, figure, make, plural, words} from './dom.js';
 import {boardsText, costText, cutListSheet} from './cutlist.js';
 import {dowelsIn, keepOutsIn, planView, sideView, stackView, supportsIn} from './drawing.js';
 import {blankOf, blankSize, data, fileOf, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
+import {undersideOf, undersideSheets} from './undersides.js';
 import {filledVolume} from './wood.js';
 import {probed, tableHeight, zeroHeight, zeroOf} from './zero.js';
 
@@ -122,7 +123,7 @@ function dowelFacts(l) {
     const of = under => dowelsIn(l).filter(d => d.under === under), under = of(true), over = of(false), lines = [];
     const size = d => `Ø ${figure(d.diameter, 2)} mm`, places = list => list.map(d => `(${d.says})`).join(', ');
     if (under.length) lines.push(make('p', {}, make('strong', {}, `laid on ${plural(under.length, 'dowel')} ${size(under[0])}, ${figure(Math.floor(under[0].below + under[0].above - 1 + 1e-6), 0)} mm long`),
-        ` at x, y ${places(under)}; first drill its underside ${figure(under[0].above, 1)} mm deep, places in dowels.csv`));
+        ` at x, y ${places(under)}; ${undersideOf(l) ? 'the programs of its underside drill its own holes' : `first drill its underside ${figure(under[0].above, 1)} mm deep, places in dowels.csv`}`));
     if (over.length) lines.push(make('p', {}, `its last program drills ${plural(over.length, 'hole')} ${size(over[0])}, ${figure(over[0].below, 1)} mm deep, at ${places(over)}`));
     return lines;
 }
@@ -160,7 +161,8 @@ function sheet(l, minutes) {
             l === 0 ? `base board ${figure(plan.job.machine.base_board_thickness, 1)} mm mounted and level` : `layer ${plan.layers[l - 1].index} faced, free of dust where the glue goes`,
             `slab at least ${figure(layer.slab_thickness, 2)} mm thick all over, no warp`,
             ...keepOutsIn(l).filter(k => k.slab || l === 0).map(k => `stands where it is drawn, no higher: ${k.says}`),
-            ...(dowelsIn(l).some(d => d.under) ? ['holes in the slab’s underside drilled as dowels.csv says, dowels set and dry-fitted'] : []),
+            ...(undersideOf(l) ? ['slab milled from below as its own sheet says, and turned over from left to right'] : []),
+            ...(dowelsIn(l).some(d => d.under) ? [undersideOf(l) ? 'dowels set and dry-fitted' : 'holes in the slab’s underside drilled as dowels.csv says, dowels set and dry-fitted'] : []),
             ...(glued ? [`glue on, pressed ${figure(plan.job.bonding.press_time_s, 0)} s`] : []),
             probed(l) ? 'XY touched off as above, Z probed by program' : 'XY and Z touched off as above',
             ...((plan.post ? plan.post.base : plan.job.machine.post) === 'grbl' && !probed(l) ? ['at each change of tool: the new tip touched off where the last one was'] : []),
@@ -231,7 +233,7 @@ export function buildSheets(section) {
     section.append(...[make('p', {class: 'note'}, 'Printing this page gives these sheets: a cover, the cut list, and a page for each layer. Boxes that you tick stay ticked in this browser. ',
         make('button', {class: 'act', type: 'button', onclick: () => window.print()}, 'Print')),
     make('nav', {class: 'jump', 'aria-label': 'Setup sheets'}, plan.layers.map((layer, l) => make('a', {href: `#sheet-${l + 1}`}, `Layer ${layer.index}`))),
-    cover(minutes), cutListSheet(), ...plan.layers.map((_, l) => {
+    cover(minutes), cutListSheet(), ...undersideSheets(), ...plan.layers.map((_, l) => {
         const made = sheet(l, minutes[l]);
         made.id = `sheet-${l + 1}`;
         return made;

@@ -1,0 +1,337 @@
+// Plans of slabs that are milled on both sides: what they make, proven from the text, and what is told where
+// an underside, its place or its turning is not as planned.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "engine/undersides/loose_pieces.h"
+#include "engine/undersides/underside_target.h"
+#include "io/quote.h"
+#include "io/slabwright.h"
+#include "io/write/stl_writer.h"
+#include "kernels/features/unmade_air.h"
+#include "kernels/mesh/weld.h"
+#include "kernels/slicing/slicing.h"
+#include "tests/support/command.h"
+#include "tests/support/files.h"
+#include "tests/support/schema.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/tunnels.h"
+
+namespace slabwright {
+namespace {
+
+using nlohmann::json;
+using support::slurp;
+using support::spit;
+using support::TemporaryFolder;
+
+/// The default job with slabs milled on both sides, and a drill for dowels of 8 mm.
+Job two_sided() {
+    Job job;
+    job.layers.sides = SlabSides::two;
+    job.dowels.per_joint = 2;
+    Tool drill = job.tools[1];
+    drill.number = 11;
+    drill.kind = ToolKind::drill;
+    drill.name = "drill 8 mm";
+    drill.diameter = drill.shank_diameter = 8;
+    drill.flute_length = 45;
+    drill.stickout = 60;
+    drill.plunge_feed = 600;
+    drill.plunges = true;
+    job.tools.push_back(drill);
+    return job;
+}
+
+/// Planned and written once, for all tests to spoil and put back.
+class TwoSided : public testing::Test {
+protected:
+    static void SetUpTestSuite() {
+        built_ = new Built;
+        Context context;
+        // A block with a tunnel of radius 15 along y.
+        write_stl(built_->stl,
+                  weld(context, support::block_with_tunnels({0, 0, 0}, {100, 70, 36}, {{50, 18, 15}})));
+        const Job job = two_sided();
+        const std::shared_ptr<Pattern> pattern = read_pattern(context, built_->stl, job);
+        Plan made = plan(context, *pattern, job);
+        built_->result = write_proven(context, made, built_->out, pattern, true);
+        built_->plan = json::parse(slurp(built_->out + "/plan.json"));
+        for (const json& layer : built_->plan["layers"])
+            if (layer.contains("underside"))
+                built_->undersides.push_back(built_->out + "/" +
+                                             layer["underside"]["folder"].get<std::string>());
+    }
+    static void TearDownTestSuite() {
+        delete built_;
+        built_ = nullptr;
+    }
+
+    /// What is found when a file holds another text for once.
+    static std::set<std::string> found(const std::string& file, const std::string& text) {
+        const std::string was = slurp(file);
+        spit(file, text);
+        Context context;
+        std::set<std::string> codes;
+        for (const Diagnostic& d : verify(context, built_->out, built_->stl, "", 1).violations)
+            codes.insert(d.code);
+        spit(file, was);
+        return codes;
+    }
+    /// The program of an underside with this purpose or kind.
+    static std::string program(const std::string& underside, const std::string& key,
+                               const std::string& value) {
+        const json under = json::parse(slurp(underside + "/plan.json"));
+        for (const json& op : under["layers"][0]["operations"])
+            if (op[key] == value) return underside + "/" + op["file"].get<std::string>();
+        return "";
+    }
+
+    struct Built {
+        TemporaryFolder folder;
+        std::string out = folder / "out", stl = folder / "tunnel.stl";
+        VerifyResult result;
+        json plan;
+        std::vector<std::string> undersides;
+    };
+    static Built* built_;
+};
+
+TwoSided::Built* TwoSided::built_ = nullptr;
+
+TEST_F(TwoSided, ATunnelIsMadeWholeAndProvenFromTheText) {
+    for (const Diagnostic& d : built_->result.violations) ADD_FAILURE() << d.code << ": " << d.message;
+    EXPECT_TRUE(built_->result.passed);
+    EXPECT_EQ(built_->undersides.size(), 1U);
+    EXPECT_LT(built_->result.unmade_mm3, 1);
+    const json verified = json::parse(slurp(built_->out + "/verify.json"));
+    ASSERT_EQ(verified["undersides"].size(), 1U);
+    EXPECT_GT(verified["undersides"][0]["removed_mm3"].get<double>(), 0.45 * 3.1416 * 225 * 70);
+}
+
+TEST_F(TwoSided, DocumentsKeepToTheirSchemas) {
+    for (std::string folder : {built_->out, built_->undersides.at(0)}) {
+        for (const std::string name : {"plan", "sequence"})
+            EXPECT_EQ(support::schema_complaint(slurp(folder + "/" + name + ".json"),
+                                                SLABWRIGHT_SOURCE_DIR "/io/" + name + ".schema.json"),
+                      "");
+    }
+}
+
+TEST_F(TwoSided, AnUndersideCutTooDeepIsAGouge) {
+    const std::string file = program(built_->undersides.at(0), "kind", "rough");
+    ASSERT_NE(file, "");
+    // Every height of the program half a millimetre lower.
+    std::string text;
+    std::istringstream lines(slurp(file));
+    for (std::string line; std::getline(lines, line);) {
+        if (const std::size_t z = line.find('Z'); z != std::string::npos && line.front() != '(') {
+            std::size_t used = 0;
+            const double height = std::stod(line.substr(z + 1), &used);
+            line = line.substr(0, z + 1) + fmt::format("{:.4f}", height - 0.5) + line.substr(z + 1 + used);
+        }
+        text += line + '\n';
+    }
+    const std::set<std::string> codes = found(file, text);
+    EXPECT_TRUE(codes.contains("gouge.cutter")) << fmt::format("{}", fmt::join(codes, " "));
+}
+
+TEST_F(TwoSided, AnUndersideThatIsNotMilledIsFound) {
+    const std::string file = program(built_->undersides.at(0), "purpose", "level contours");
+    ASSERT_NE(file, "");
+    std::filesystem::rename(file, file + ".away");
+    Context context;
+    std::set<std::string> codes;
+    for (const Diagnostic& d : verify(context, built_->out, built_->stl, "", 1).violations)
+        codes.insert(d.code);
+    std::filesystem::rename(file + ".away", file);
+    EXPECT_TRUE(codes.contains("program.missing"));
+    EXPECT_TRUE(codes.contains("left.missed") || codes.contains("left.too_much"));
+}
+
+TEST_F(TwoSided, ASlabThatIsNotTurnedIsFound) {
+    const std::string file = built_->out + "/sequence.json";
+    for (const char* action : {"turn_over", "mill_underside"}) {
+        json sequence = json::parse(slurp(file));
+        json& steps = sequence["steps"];
+        const auto step =
+            std::find_if(steps.begin(), steps.end(), [&](const json& s) { return s["action"] == action; });
+        ASSERT_NE(step, steps.end());
+        // Those that wait for it wait for what it waits for.
+        const json id = (*step)["id"], before = (*step)["needs"];
+        steps.erase(step);
+        for (json& s : steps) {
+            json needs = json::array();
+            for (const json& need : s["needs"])
+                if (need != id) needs.push_back(need);
+                else needs.insert(needs.end(), before.begin(), before.end());
+            s["needs"] = needs;
+        }
+        const std::set<std::string> codes = found(file, sequence.dump());
+        EXPECT_TRUE(codes.contains("sequence.order")) << action;
+    }
+}
+
+TEST_F(TwoSided, ADowelMirroredTheWrongWayIsFound) {
+    // Turned about x in place of y: in the plan of the underside, and in the program that drills it.
+    const std::string file = built_->undersides.at(0) + "/plan.json";
+    json under = json::parse(slurp(file));
+    json& dowels = under["layers"][0]["dowels"];
+    ASSERT_GE(dowels.size(), 2U);
+    const double width = under["stock"]["max"][1];
+    for (json& d : dowels) d["y"] = width - d["y"].get<double>();
+    EXPECT_TRUE(found(file, under.dump()).contains("dowel.underside"));
+    const std::string holes = program(built_->undersides.at(0), "purpose", "dowel holes");
+    ASSERT_NE(holes, "");
+    std::string text;
+    std::istringstream lines(slurp(holes));
+    for (std::string line; std::getline(lines, line);) {
+        if (const std::size_t y = line.find('Y'); y != std::string::npos && line.front() != '(') {
+            std::size_t used = 0;
+            const double at = std::stod(line.substr(y + 1), &used);
+            line = line.substr(0, y + 1) + fmt::format("{:.4f}", width - at) + line.substr(y + 1 + used);
+        }
+        text += line + '\n';
+    }
+    const std::set<std::string> codes = found(holes, text);
+    EXPECT_TRUE(codes.contains("dowel.missing") || codes.contains("dowel.place"))
+        << fmt::format("{}", fmt::join(codes, " "));
+}
+
+TEST_F(TwoSided, AnUndersideOfAnotherSlabIsFound) {
+    const std::string file = built_->undersides.at(0) + "/plan.json";
+    json under = json::parse(slurp(file));
+    under["turned"]["z_bottom"] = under["turned"]["z_bottom"].get<double>() + 0.5;
+    EXPECT_TRUE(found(file, under.dump()).contains("underside.slab"));
+}
+
+TEST_F(TwoSided, WhatDoesNotGoWithItIsRefused) {
+    Context context;
+    const auto refused = [&](const std::function<void(Job&)>& change) {
+        Job job = two_sided();
+        change(job);
+        try {
+            (void)plan(context, built_->stl, job);
+        } catch (const Error& error) {
+            return error.code() + (error.remedy().empty() ? " without remedy" : "");
+        }
+        return std::string("planned");
+    };
+    EXPECT_EQ(refused([](Job& job) { job.dowels.per_joint = 0; }), "job.range");
+    EXPECT_EQ(refused([](Job& job) {
+                  job.flask.enabled = true;
+                  job.flask.gap = 30;
+              }),
+              "layers.sides");
+    EXPECT_EQ(refused([](Job& job) { job.layers.strategy = LayerStrategy::combined; }), "layers.sides");
+    EXPECT_EQ(refused([](Job& job) { job.layers.sides = SlabSides::one; }), "undercut.unmade");
+}
+
+TEST_F(TwoSided, CommandsThatDoNotKnowItSaySo) {
+    const auto told = [&](std::vector<std::string> arguments) {
+        arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
+        return support::run_command(arguments);
+    };
+    const support::CommandResult resumed = told({"resume", built_->out});
+    EXPECT_EQ(resumed.exit, 2) << resumed.err;
+    EXPECT_NE(resumed.err.find("both sides"), std::string::npos) << resumed.err;
+    const support::CommandResult without_dowels =
+        told({"plan", built_->stl, "--sides", "two", "-o", built_->folder / "other"});
+    EXPECT_EQ(without_dowels.exit, 2) << without_dowels.err;
+    EXPECT_NE(without_dowels.err.find("dowels.per_joint"), std::string::npos) << without_dowels.err;
+    const support::CommandResult alone = told({"verify", built_->undersides.at(0)});
+    EXPECT_NE(alone.exit, 0);
+    EXPECT_NE(alone.err.find("underside"), std::string::npos) << alone.err;
+    Context context;
+    EXPECT_THROW((void)quote_model(context, built_->stl, two_sided()), Error);
+}
+
+TEST_F(TwoSided, AFolderWithUndersidesIsReplacedAsAPlanAndKeptWithAStranger) {
+    EXPECT_NO_THROW(require_replaceable(built_->out));
+    const std::string note = built_->undersides.at(0) + "/note.txt";
+    spit(note, "mine");
+    EXPECT_THROW(require_replaceable(built_->out), Error);
+    std::filesystem::remove(note);
+    EXPECT_NO_THROW(require_replaceable(built_->out));
+}
+
+TEST_F(TwoSided, AutomaticMillsFromBelowOnlyWhereThatMakesMore) {
+    Context context;
+    Job job = two_sided();
+    job.layers.sides = SlabSides::automatic;
+    EXPECT_EQ(plan(context, built_->stl, job).undersides.size(), 1U);
+    const std::string block = built_->folder / "block.stl";
+    write_stl(block, weld(context, shapes::box({0, 0, 0}, {100, 70, 36})));
+    EXPECT_TRUE(plan(context, block, job).undersides.empty());
+}
+
+/// A slab of 19 mm in a block of 60 x 40 x 18 mm, with 10 mm around it.
+TurnedSlab slab_of_block() { return {1, 0, 18, 19, {{-10, -10}, {70, 50}}, 0, 10}; }
+
+TEST(UndersideTarget, IsThePatternTurnedInItsTray) {
+    Context context;
+    // A plate on a foot: what lies beside the foot, under the plate, is milled from below.
+    shapes::Facets facets = shapes::box({20, 10, 0}, {40, 30, 10});
+    shapes::append(facets, shapes::box({0, 0, 8}, {60, 40, 18}));
+    const Mesh pattern = weld(context, facets);
+    TurnedSlab slab = slab_of_block();
+    const Mesh target = underside_target(context, pattern.view(), slab);
+    const std::vector<Plane> planes{{5, Side::above}, {18, Side::above}, {0.5, Side::above}};
+    const std::vector<Section> sections = slice(context, target.view(), planes);
+    const auto is_solid = [&](std::size_t k, double x, double y) {
+        return winding(sections[k].loops, {to_units(x), to_units(y)}) != 0;
+    };
+    EXPECT_TRUE(is_solid(0, 40, 30));   // the plate, which lies at z' 1 to 11
+    EXPECT_TRUE(is_solid(1, 40, 30));   // the foot
+    EXPECT_FALSE(is_solid(1, 15, 30));  // beside it
+    EXPECT_TRUE(is_solid(1, 1, 1));     // the rim
+    EXPECT_TRUE(is_solid(2, 5, 5));     // the film
+    EXPECT_TRUE(hangs_together(context, target, slab) ||
+                area(underside_region(context, pattern.view(), slab)) > 70.0 * 50);
+}
+
+TEST(UndersideTarget, WhatComesLooseIsHeldByStrips) {
+    Context context;
+    // A mushroom upside down: its cap is an island in what is milled around it.
+    shapes::Facets facets = shapes::box({25, 15, 0}, {35, 25, 10});
+    shapes::append(facets, shapes::box({15, 5, 8}, {45, 35, 18}));
+    const Mesh pattern = weld(context, facets);
+    TurnedSlab slab = slab_of_block();
+    slab.blank = {{-30, -30}, {90, 70}};
+    EXPECT_FALSE(hangs_together(context, underside_target(context, pattern.view(), slab), slab));
+    slab.web = kStripWeb;
+    EXPECT_TRUE(has_strips(slab));
+    EXPECT_TRUE(hangs_together(context, underside_target(context, pattern.view(), slab), slab));
+    slab.web = kWholeWeb;
+    EXPECT_FALSE(has_strips(slab));
+}
+
+TEST(UndersideTarget, WhatLiesInItsWebStaysUnmade) {
+    Context context;
+    // Under a roof that is 1 mm thick: of 17 mm of air 2 lie in the web.
+    shapes::Facets facets = shapes::box({0, 0, 0}, {20, 40, 18});
+    shapes::append(facets, shapes::box({10, 0, 17}, {60, 40, 18}));
+    const AirGaps gaps = air_gaps(context, weld(context, facets).view(), 0.5);
+    const auto left = [&](const MilledLayer& layer) {
+        return unmade_air(context, gaps, {{layer}}).volume_mm3;
+    };
+    const double mm2 = 40 * 40;
+    EXPECT_NEAR(left({18, MilledFrom::above}), 17 * mm2, 0.03 * 17 * mm2);
+    EXPECT_NEAR(left({18, MilledFrom::both_sides}), 0, 1);
+    EXPECT_NEAR(left({18, MilledFrom::both_sides, 3}), 2 * mm2, 0.05 * 2 * mm2);
+    const MilledLayer strips{18, MilledFrom::both_sides, 3, 20, 5, 0, 0};
+    EXPECT_NEAR(left(strips), 2 * mm2 / 4, 0.15 * 2 * mm2 / 4);
+}
+
+}  // namespace
+}  // namespace slabwright
