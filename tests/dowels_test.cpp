@@ -265,7 +265,9 @@ TEST(Dowels, AFacetsDistanceIsThatOfWhatLiesBetweenTheHeights) {
             }
         const double found = plan_distance(facet, heights, x, y);
         EXPECT_LE(found, sampled + 1e-9);
-        if (std::isfinite(sampled) && heights[1] - heights[0] > 1) EXPECT_GE(found, sampled - 0.6);
+        if (std::isfinite(sampled) && heights[1] - heights[0] > 1) {
+            EXPECT_GE(found, sampled - 0.6);
+        }
     }
 }
 

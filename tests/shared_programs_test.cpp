@@ -204,17 +204,22 @@ TEST(SharedPrograms, GoWhereOneProgramForEachOperationGoes) {
                         EXPECT_TRUE(std::includes(moved.begin(), moved.end(), stated.begin(), stated.end()));
                         const std::size_t line = program_line(plan, layer, layer.operations[i], 2,
                                                               lines_before(plan, layer, layer.operations[i]));
-                        if (line != 0) EXPECT_EQ(line, move_lines(plan, layer, layer.operations[i])[2]);
+                        if (line != 0) {
+                            EXPECT_EQ(line, move_lines(plan, layer, layer.operations[i])[2]);
+                        }
                     }
                 }
                 // By tool no two neighbours use the same one; by layer there is one file.
-                if (span == ProgramSpan::layer) EXPECT_EQ(names.size(), 1u);
+                if (span == ProgramSpan::layer) {
+                    EXPECT_EQ(names.size(), 1u);
+                }
                 for (std::size_t i = 0; span == ProgramSpan::tool && i < layer.operations.size();) {
                     const std::size_t end = file_end(layer, i);
                     for (std::size_t k = i; k < end; ++k)
                         EXPECT_EQ(layer.operations[k].tool, layer.operations[i].tool);
-                    if (end < layer.operations.size())
+                    if (end < layer.operations.size()) {
                         EXPECT_NE(layer.operations[end].tool, layer.operations[i].tool);
+                    }
                     i = end;
                 }
             }
@@ -420,7 +425,9 @@ TEST(SharedPrograms, AFolderProvesItself) {
             for (const Layer& layer : made.layers)
                 for (const Operation& op : layer.operations) named.insert(std::string(file_of(op.file)));
             EXPECT_EQ(files, named);
-            if (span == ProgramSpan::layer) EXPECT_EQ(files.size(), made.layers.size());
+            if (span == ProgramSpan::layer) {
+                EXPECT_EQ(files.size(), made.layers.size());
+            }
             for (const char* name : {"plan", "sequence"})
                 EXPECT_EQ(schema_complaint(slurp(out + "/" + name + ".json"),
                                            fmt::format("{}/io/{}.schema.json", SLABWRIGHT_SOURCE_DIR, name)),

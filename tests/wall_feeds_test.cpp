@@ -255,7 +255,8 @@ TEST(WallFeeds, NoPassGoesWhereNothingStands) {
         for (const Operation& op : plan.layers[0].operations) {
             std::vector<char> cuts(op.moves.size(), 0);
             slab.run(op, plan.job.tools[static_cast<std::size_t>(op.tool) - 1], [&](const CutStretch& s) {
-                for (std::uint32_t k = s.first; k <= s.last; ++k) cuts[k] |= s.cuts() ? 1 : 0;
+                for (std::uint32_t k = s.first; k <= s.last; ++k)
+                    if (s.cuts()) cuts[k] = 1;
             });
             if (op.kind != OperationKind::finish) continue;
             for (std::size_t k = 1; k < op.moves.size(); ++k) {

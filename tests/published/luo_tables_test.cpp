@@ -84,9 +84,10 @@ TEST(LuoTable51, HoldsWhereItsConditionDoes) {
                         << r << ' ' << degrees << ' ' << leftover;
                 else EXPECT_LT(sampled_leftover(r, a, sd), leftover);
                 const double ours = ball_level_stepdown(r, a, leftover);
-                if (ours * cot(a) < 2 * r)
+                if (ours * cot(a) < 2 * r) {
                     EXPECT_NEAR(sampled_leftover(r, a, ours), leftover, 0.01 * leftover)
                         << r << ' ' << degrees << ' ' << leftover;
+                }
             }
     const double r = 0.125, a = rad(87);
     EXPECT_NEAR(table51(r, a, 0.002, -1), 0.0445, 5e-5);
@@ -124,8 +125,12 @@ protected:
         constexpr double threshold = 0.975;  // print's
         for (std::size_t k = 0; k < computed.size(); ++k) {
             EXPECT_NEAR(computed[k], stated[k], 0.002) << k;
-            if (published[k] > 0) EXPECT_EQ(computed[k] >= threshold, published[k] >= threshold) << k;
-            if (k > 0) EXPECT_GE(computed[k], computed[k - 1]) << "a smaller ball reaches no less";
+            if (published[k] > 0) {
+                EXPECT_EQ(computed[k] >= threshold, published[k] >= threshold) << k;
+            }
+            if (k > 0) {
+                EXPECT_GE(computed[k], computed[k - 1]) << "a smaller ball reaches no less";
+            }
         }
     }
 };
