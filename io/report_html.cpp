@@ -242,7 +242,10 @@ void replay_programs(Context& context, const PlannedFolder& folder, const Simula
         const PackedHeights wood = packed_wood(input.layers[layer], found.surface);
         figures.wood.push_back({{"rle", wood.in_runs}, {"data", wood.base64}});
     });
-    const PackedFilling filled = packed_filling(context, input.mesh, input.layers, replay.first(),
+    std::vector<bool> both_sides(input.layers.size(), false);
+    for (const UndersideToMill& underside : folder.build.undersides)
+        both_sides.at(static_cast<std::size_t>(underside.layer - 1)) = true;
+    const PackedFilling filled = packed_filling(context, input.mesh, input.layers, both_sides, replay.first(),
                                                 options.cell, replay.nx(), replay.ny());
     Json layers = Json::array();
     for (const PackedFilling::Layer& l : filled.layers)

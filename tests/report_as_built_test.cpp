@@ -65,7 +65,8 @@ TEST(ReportAsBuilt, FillingIsABoxARow) {
     Context context;
     const Mesh mesh = weld(context, facets);
     const SimulatedLayer layers[] = {layer_of(0, 4), layer_of(4, 10)};
-    const PackedFilling filling = packed_filling(context, mesh.view(), layers, {-1.5, 0.5}, 1, 34, 10);
+    const PackedFilling filling =
+        packed_filling(context, mesh.view(), layers, {false, false}, {-1.5, 0.5}, 1, 34, 10);
     EXPECT_EQ(filling.z0, 0);
     EXPECT_EQ(filling.height, 10);
     ASSERT_EQ(filling.layers.size(), 2U);
@@ -81,4 +82,22 @@ TEST(ReportAsBuilt, FillingIsABoxARow) {
         EXPECT_NEAR(words[5 * row + 3], 0.4 * 65535, 1);
         EXPECT_NEAR(words[5 * row + 4], 0.5 * 65535, 1);
     }
+    const PackedFilling turned =
+        packed_filling(context, mesh.view(), layers, {false, true}, {-1.5, 0.5}, 1, 34, 10);
+    EXPECT_EQ(turned.layers[1].mm3, 0) << "which is milled from below";
+    EXPECT_TRUE(turned.layers[1].boxes.empty());
+}
+
+// A hollow inside a layer opens to neither side.
+TEST(ReportAsBuilt, WhatTwoSidesLeaveStays) {
+    shapes::Facets facets = shapes::box({0, 0, 0}, {20, 20, 3});
+    shapes::append(facets, shapes::box({0, 0, 2}, {5, 20, 8}));
+    shapes::append(facets, shapes::box({15, 0, 2}, {20, 20, 8}));
+    shapes::append(facets, shapes::box({0, 0, 7}, {20, 20, 10}));
+    Context context;
+    const Mesh mesh = weld(context, facets);
+    const SimulatedLayer layers[] = {layer_of(0, 10)};
+    const PackedFilling filling =
+        packed_filling(context, mesh.view(), layers, {true}, {-1.5, 0.5}, 1, 24, 20);
+    EXPECT_EQ(filling.layers[0].mm3, 10 * 20 * 4);
 }

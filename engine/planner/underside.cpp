@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 #include <utility>
 
 #include "engine/layers/both_sides.h"
@@ -194,6 +195,17 @@ void settle_unmade(Context& context, Plan& plan, const AirGaps& gaps, const std:
         "turn or split the pattern, or accept it with --allow-undercut");
 }
 
+namespace {
+
+/// What is told of the only layer of an underside's plan, but for that it is the first.
+std::string_view without_layer(std::string_view message) {
+    for (const std::string_view head : {"layer 1, ", "layer 1: "})
+        if (message.starts_with(head)) message.remove_prefix(head.size());
+    return message;
+}
+
+}  // namespace
+
 void plan_undersides(Context& context, Plan& plan, MeshView pattern, const std::vector<MilledLayer>& milled,
                      ProgressShare share) {
     std::vector<std::size_t> turned;
@@ -209,7 +221,8 @@ void plan_undersides(Context& context, Plan& plan, MeshView pattern, const std::
                 plan.diagnostics.push_back(
                     {told.severity,
                      told.code,
-                     fmt::format("underside of layer {}: {}", plan.layers[turned[k]].index, told.message),
+                     fmt::format("underside of layer {}: {}", plan.layers[turned[k]].index,
+                                 without_layer(told.message)),
                      {}});
     }
 }

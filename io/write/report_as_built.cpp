@@ -6,6 +6,7 @@
 #include <string>
 
 #include "io/text/base64.h"
+#include "kernels/access/standing_part.h"
 #include "kernels/features/filled_columns.h"
 
 namespace slabwright {
@@ -76,15 +77,20 @@ PackedHeights packed_wood(const SimulatedLayer& layer, const std::vector<float>&
 }
 
 PackedFilling packed_filling(Context& context, MeshView mesh, std::span<const SimulatedLayer> layers,
-                             const std::array<double, 2>& first, double cell, int nx, int ny) {
+                             const std::vector<bool>& both_sides, const std::array<double, 2>& first,
+                             double cell, int nx, int ny) {
     const Box3 box = bounds(context, mesh);
     const double z0 = box.min.z, height = std::max(1e-9, double{box.max.z} - z0);
     std::vector<double> borders{z0};
     for (const SimulatedLayer& layer : layers) borders.push_back(std::max(layer.z_top, borders.back()));
     borders.back() = HUGE_VAL;  // as measure_undercuts() has it
-    const auto rows =
+    auto rows =
         filled_gaps(context, mesh, borders,
                     {first[0], first[1], cell, static_cast<std::size_t>(ny), static_cast<std::size_t>(nx)});
+    for (auto& row : rows)
+        std::erase_if(row, [&](const FilledGap& gap) {
+            return both_sides[gap.layer] && gap.low <= borders[gap.layer] + StandingPart::kSheet;
+        });
     double tolerance = kFirstTolerance;
     std::vector<std::vector<FilledBox>> boxes(layers.size());
     for (;; tolerance *= 2) {

@@ -37,9 +37,11 @@ struct PackedFilling {
     std::vector<Layer> layers;
 };
 
+/// @param both_sides by layer, whether its slab is milled from below too: what is open there is made
 /// @param first the grid's first point, mm, @param cell mm between its points
 [[nodiscard]] PackedFilling packed_filling(Context& context, MeshView mesh,
                                            std::span<const SimulatedLayer> layers,
+                                           const std::vector<bool>& both_sides,
                                            const std::array<double, 2>& first, double cell, int nx, int ny);
 
 }  // namespace slabwright
