@@ -87,43 +87,20 @@ double max_layer_thickness(const Job& job) {
     return std::min(slab - job.slabs.facing_allowance, max_bonded_layer_thickness(job));
 }
 
-bool says_rounding(Post post) {
-    switch (post) {
-        case Post::linuxcnc:
-        case Post::haas:
-        case Post::siemens:
-        case Post::heidenhain:
-            return true;
-        case Post::fanuc:
-        case Post::grbl:
-        case Post::mach:
-        case Post::iso:
-            return false;
-    }
-    return false;
-}
+static_assert([] {
+    std::size_t at = 0;
+    for (const Control& control : kControls)
+        if (control.post != static_cast<Post>(at++)) return false;
+    return true;
+}());
 
-bool knows_tool_lengths(Post post) { return post != Post::grbl; }
-bool changes_tools(Post post) { return post != Post::grbl; }
+bool says_rounding(Post post) { return control_of(post).says_rounding; }
+bool knows_tool_lengths(Post post) { return control_of(post).keeps_lengths; }
+bool changes_tools(Post post) { return control_of(post).changes_tools; }
 
 std::string program_file(Post post, const std::string& stem) {
-    switch (post) {
-        case Post::linuxcnc:
-            return stem + ".ngc";
-        case Post::fanuc:
-        case Post::haas:
-        case Post::iso:
-            return stem + ".nc";
-        case Post::grbl:
-            return stem + ".gcode";
-        case Post::mach:
-            return stem + ".tap";
-        case Post::siemens:
-            return "_" + stem + ".mpf";
-        case Post::heidenhain:
-            return stem + ".h";
-    }
-    return stem;
+    const Control& control = control_of(post);
+    return control.before + stem + control.ending;
 }
 
 std::string program_file(const Machine& machine, const std::string& stem) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/controls.h"
 #include "engine/keep_out.h"
 #include "engine/probing.h"
 #include "kernels/features/features.h"
@@ -34,8 +35,6 @@ enum class BuildTable : std::uint8_t { moving, fixed };
 /// carries over it (RPM); a head beside the spindle on the stack's top; or, automatic, as RPM where the
 /// machine has a handler and by hand elsewhere (glue_head_of).
 enum class GlueHead : std::uint8_t { automatic, none, slab, stack };
-/// The control that the programs are written for, and whose text is proven (io/posts/dialect.h).
-enum class Post : std::uint8_t { linuxcnc, fanuc, haas, grbl, mach, iso, siemens, heidenhain };
 /// What one program holds: an operation, all that one tool does without a change in a layer, or a layer.
 enum class ProgramSpan : std::uint8_t { operation, tool, layer };
 /// Which slopes level contours finish and which projected paths do (SHAPING 5): each its own side of the

@@ -44,28 +44,6 @@ void require(const std::string& key, double value, double low, double high, Ends
                        why != nullptr && value < low ? fmt::format(" ({})", why) : ""));
 }
 
-/// The highest number that a control's tool table, or its table of lengths, goes to.
-int highest_tool(Post post) {
-    switch (post) {
-        case Post::linuxcnc:
-            return 99999;
-        case Post::fanuc:
-        case Post::iso:
-            return 999;
-        case Post::haas:
-            return 200;
-        case Post::grbl:
-            return 255;
-        case Post::mach:
-            return 254;
-        case Post::siemens:
-            return 32000;
-        case Post::heidenhain:
-            return 32767;
-    }
-    return 99999;
-}
-
 void validate_corner(const Tool& tool, const std::string& key) {
     if (tool.kind != ToolKind::bull_nose) {
         if (tool.corner_radius != 0)
@@ -87,7 +65,7 @@ void validate_corner(const Tool& tool, const std::string& key) {
 
 void validate_tool(const Tool& tool, std::size_t position, Post post) {
     const auto key = [&](const char* name) { return fmt::format("tool[{}].{}", position + 1, name); };
-    require(key("number"), tool.number, 1, highest_tool(post));
+    require(key("number"), tool.number, 1, control_of(post).highest_tool);
     require(key("diameter"), tool.diameter, 0.3, 1000, Ends::closed, kNoCutter);
     require(key("flute_length"), tool.flute_length, 0.1, 1000, Ends::closed, kNoCutter);
     require(key("shank_diameter"), tool.shank_diameter, 0.1, 1000, Ends::closed, kNoCutter);

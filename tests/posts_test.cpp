@@ -45,8 +45,11 @@ using slabwright::support::TemporaryFolder;
 
 namespace {
 
-constexpr Post kPosts[] = {Post::linuxcnc, Post::fanuc, Post::haas,    Post::grbl,
-                           Post::mach,     Post::iso,   Post::siemens, Post::heidenhain};
+const std::vector<Post> kPosts = [] {
+    std::vector<Post> all;
+    for (const Control& control : kControls) all.push_back(control.post);
+    return all;
+}();
 constexpr LengthUnit kUnits[] = {LengthUnit::mm, LengthUnit::inch};
 constexpr double kNear = 0.5e-3 + 1e-9;  // mm
 const std::string kModels = SLABWRIGHT_SOURCE_DIR "/tests/data/";

@@ -18,36 +18,12 @@ constexpr const char* kByHand =
     throw Error(ErrorKind::usage, "job.probe", message, "machine.probe", remedy);
 }
 
-/// Why no probing program is written for a control; "" where one is.
-std::string_view unsure_of(Post post) {
-    switch (post) {
-        case Post::linuxcnc:
-        case Post::grbl:
-            return "";
-        case Post::fanuc:
-            return "the skip block G31 goes on without an alarm where nothing is touched, and the macro "
-                   "variables that tell are an option of the control";
-        case Post::haas:
-            return "the words that switch the probe on before G31 differ from machine to machine";
-        case Post::mach:
-            return "Mach's G31 goes on without an alarm where nothing is touched";
-        case Post::iso:
-            return "plain ISO has no word for a probing move";
-        case Post::siemens:
-            return "which input MEAS reads, and how a frame is set, differ from machine to machine";
-        case Post::heidenhain:
-            return "its touch probe cycles take feeds and heights from a table of the control, which no "
-                   "program tells";
-    }
-    return "";
-}
-
 }  // namespace
 
 void check_probing(const Job& job) {
     const Machine& machine = job.machine;
     if (machine.probe == ProbeMode::none) return;
-    if (const std::string_view why = unsure_of(machine.post); !why.empty())
+    if (const std::string_view why = control_of(machine.post).unsure_of_probing; !why.empty())
         refuse(fmt::format("no probing program is written for this machine.post: {}", why), kByHand);
     if (machine.own_post) refuse("a post of your own has no probing program", kByHand);
     if (machine.magazine > 0)

@@ -2,6 +2,9 @@
 // defaults, naming unknown keys and writing the job into plan.json all walk it, so they cannot disagree.
 #pragma once
 
+#include <iterator>
+#include <utility>
+
 #include "engine/job.h"
 
 namespace slabwright {
@@ -65,10 +68,15 @@ constexpr bool shows(const Visit&, bool used) {
     else return true;
 }
 inline constexpr Word<Blanks> kBlankWords[] = {{"pattern", Blanks::pattern}, {"layer", Blanks::layer}};
-inline constexpr Word<Post> kPostWords[] = {{"linuxcnc", Post::linuxcnc}, {"fanuc", Post::fanuc},
-                                            {"haas", Post::haas},         {"grbl", Post::grbl},
-                                            {"mach", Post::mach},         {"iso", Post::iso},
-                                            {"siemens", Post::siemens},   {"heidenhain", Post::heidenhain}};
+template <std::size_t... i>
+consteval auto words_of_controls(std::index_sequence<i...> /*each*/) {
+    struct Words {
+        Word<Post> all[sizeof...(i)];
+    };
+    return Words{{{kControls[i].word, kControls[i].post}...}};
+}
+inline constexpr auto kControlWords = words_of_controls(std::make_index_sequence<std::size(kControls)>());
+inline constexpr const Word<Post> (&kPostWords)[std::size(kControls)] = kControlWords.all;
 inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated},
                                                         {"nominal", Engagement::nominal}};
 inline constexpr Word<SelectionMode> kSelectionWords[] = {{"select", SelectionMode::select},
