@@ -303,7 +303,7 @@ TEST(Posts, ProgramsOfPartsReadBackTheSame) {
             if (entry.path().extension() == ".stl" && entry.file_size() < (2u << 20))
                 castings.push_back(entry.path().string());
         std::sort(castings.begin(), castings.end());
-        if (castings.size() > 5) castings.resize(5);
+        if (castings.size() > 2) castings.resize(2);  // what a dialect says does not depend on the part
         parts.insert(parts.end(), castings.begin(), castings.end());
     }
     const bool has_toolpath = support::has_grbl_toolpath();
