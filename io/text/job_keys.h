@@ -70,10 +70,10 @@ constexpr bool shows(const Visit&, bool used) {
 inline constexpr Word<Blanks> kBlankWords[] = {{"pattern", Blanks::pattern}, {"layer", Blanks::layer}};
 template <std::size_t... i>
 consteval auto words_of_controls(std::index_sequence<i...> /*each*/) {
-    struct Words {
+    struct Table {
         Word<Post> all[sizeof...(i)];
     };
-    return Words{{{kControls[i].word, kControls[i].post}...}};
+    return Table{{{kControls[i].word, kControls[i].post}...}};
 }
 inline constexpr auto kControlWords = words_of_controls(std::make_index_sequence<std::size(kControls)>());
 inline constexpr const Word<Post> (&kPostWords)[std::size(kControls)] = kControlWords.all;

@@ -21,7 +21,8 @@ using Calls = std::map<std::string, std::vector<long>>;
 
 void fail_calls(const Undertaking& u, const Attempts& attempts, const Calls& calls) {
     std::size_t told = 0, runs = 0;
-    for (const char* kind : {"write", "open", "rename", "mkdir", "sync", "close", "read", "map"})
+    for (const char* kind : {"write", "open", "rename", "mkdir", "sync", "close", "read", "map"}) {
+        if (std::string_view(kind) == "map" && !u.maps) continue;
         for (const long n : chosen(calls.at(kind), 2 + soak()))
             for (const char* onwards : {"", "+"}) {
                 if (*onwards != 0 && (n % 2 == 0 || std::string_view(kind) == "map") && soak() == 0) continue;
@@ -30,6 +31,7 @@ void fail_calls(const Undertaking& u, const Attempts& attempts, const Calls& cal
                 told += attempts.expect_done_or_told(run(attempts.command(), fault), u.name + (", " + fault));
                 ++runs;
             }
+    }
     std::printf("%s: %zu of %zu faults were told, the others did no harm\n", u.name, told, runs);
     EXPECT_GT(told, 0u);
 }
