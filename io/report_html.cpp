@@ -166,6 +166,14 @@ Json feeds_json(const Program& program) {
     return {{"low", json(feeds.low)}, {"high", json(feeds.high)}, {"plunge", json(feeds.plunge)}};
 }
 
+/// By layer, whether its slab is milled from below too.
+std::vector<bool> milled_below(const PlannedFolder& folder) {
+    std::vector<bool> below(folder.simulation.layers.size(), false);
+    for (const UndersideToMill& underside : folder.build.undersides)
+        below.at(static_cast<std::size_t>(underside.layer - 1)) = true;
+    return below;
+}
+
 /// What stands over in the end takes up to a fifth of the time of the replay: so many programs' steps.
 std::size_t left_over_steps(const PlannedFolder& folder) { return 1 + folder.build.programs.size() / 8; }
 
@@ -242,11 +250,8 @@ void replay_programs(Context& context, const PlannedFolder& folder, const Simula
         const PackedHeights wood = packed_wood(input.layers[layer], found.surface);
         figures.wood.push_back({{"rle", wood.in_runs}, {"data", wood.base64}});
     });
-    std::vector<bool> both_sides(input.layers.size(), false);
-    for (const UndersideToMill& underside : folder.build.undersides)
-        both_sides.at(static_cast<std::size_t>(underside.layer - 1)) = true;
-    const PackedFilling filled = packed_filling(context, input.mesh, input.layers, both_sides, replay.first(),
-                                                options.cell, replay.nx(), replay.ny());
+    const PackedFilling filled = packed_filling(context, input.mesh, input.layers, milled_below(folder),
+                                                replay.first(), options.cell, replay.nx(), replay.ny());
     Json layers = Json::array();
     for (const PackedFilling::Layer& l : filled.layers)
         layers.push_back({{"boxes", l.boxes}, {"mm3", l.mm3}});
