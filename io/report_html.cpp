@@ -166,14 +166,6 @@ Json feeds_json(const Program& program) {
     return {{"low", json(feeds.low)}, {"high", json(feeds.high)}, {"plunge", json(feeds.plunge)}};
 }
 
-/// By layer, whether its slab is milled from below too.
-std::vector<bool> milled_below(const PlannedFolder& folder) {
-    std::vector<bool> below(folder.simulation.layers.size(), false);
-    for (const UndersideToMill& underside : folder.build.undersides)
-        below.at(static_cast<std::size_t>(underside.layer - 1)) = true;
-    return below;
-}
-
 /// What stands over in the end takes up to a fifth of the time of the replay: so many programs' steps.
 std::size_t left_over_steps(const PlannedFolder& folder) { return 1 + folder.build.programs.size() / 8; }
 

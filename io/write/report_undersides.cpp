@@ -28,6 +28,13 @@ Json outlines(const Loops& region) {
 
 }  // namespace
 
+std::vector<bool> milled_below(const PlannedFolder& folder) {
+    std::vector<bool> below(folder.simulation.layers.size(), false);
+    for (const UndersideToMill& underside : folder.build.undersides)
+        below.at(static_cast<std::size_t>(underside.layer - 1)) = true;
+    return below;
+}
+
 std::string report_undersides(Context& context, const PlannedFolder& folder, MeshView mesh,
                               const FolderRefusal& refusal) {
     Json list = Json::array();

@@ -2,12 +2,16 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "io/read/planned_folder.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 
 namespace slabwright {
+
+/// By layer, whether its slab is milled from below too.
+[[nodiscard]] std::vector<bool> milled_below(const PlannedFolder& folder);
 
 /// A JSON list, for each underside: its slab as it lies turned over, mm, where it is milled (`region`,
 /// outlines in hundredths of a millimetre), its dowels' holes, and its programs.
