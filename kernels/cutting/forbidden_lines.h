@@ -25,6 +25,21 @@ inline bool covered(const std::vector<Stretch>& cover, std::uint32_t& at, double
     return high <= cover[at].high;
 }
 
+/// Makes one of intervals that meet, of such as ascend by their lower ends.
+inline void join_ascending(std::vector<Forbidden>& on_line) {
+    constexpr double merge_gap = 1e-6;  // mm; gaps this small are rounding between neighbouring elements
+    std::size_t kept = 0;
+    for (const Forbidden& f : on_line) {
+        if (kept == 0 || f.low > on_line[kept - 1].high + merge_gap) {
+            on_line[kept++] = f;
+            continue;
+        }
+        Forbidden& last = on_line[kept - 1];
+        if (f.high > last.high) last.high = f.high, last.nz_high = f.nz_high;
+    }
+    on_line.resize(kept);
+}
+
 /// What a ball forbids is kept ascending and disjoint as it is found; a flat cutter's intervals are joined in
 /// the end, or when they are taken for covered.
 class ForbiddenLines {
@@ -53,8 +68,6 @@ protected:
     };
     static constexpr double kNowhere = std::numeric_limits<double>::infinity();
     static constexpr double kFarAway = 1e30;  // mm; where lines are that fill up a block's last step
-    static constexpr double kMergeGap =
-        1e-6;  // mm; gaps this small are rounding between neighbouring elements
 
     /// @param lines ascending, at most kLinesTogether
     ForbiddenLines(bool ball, double radius, std::span<const std::int32_t> lines)
@@ -89,16 +102,7 @@ protected:
             std::sort(on_line.begin(), on_line.end(), [](const Forbidden& a, const Forbidden& b) {
                 return a.low != b.low ? a.low < b.low : a.high < b.high;
             });
-        std::size_t kept = 0;
-        for (const Forbidden& f : on_line) {
-            if (kept == 0 || f.low > on_line[kept - 1].high + kMergeGap) {
-                on_line[kept++] = f;
-                continue;
-            }
-            Forbidden& last = on_line[kept - 1];
-            if (f.high > last.high) last.high = f.high, last.nz_high = f.nz_high;
-        }
-        on_line.resize(kept);
+        join_ascending(on_line);
     }
 
     // Those within the radius of [low, high].

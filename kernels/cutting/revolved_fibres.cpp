@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "kernels/cutting/forbidden_lines.h"
 #include "kernels/cutting/revolved.h"
 #include "kernels/parallel/parallel.h"
 
@@ -13,7 +14,6 @@ namespace slabwright {
 namespace {
 
 constexpr std::size_t kBlock = 64;  // lines that share one look at the facets
-constexpr double kMergeGap = 1e-6;  // mm; gaps this small are rounding between neighbouring elements
 
 // Lines of one block at one height; what is forbidden on each is kept ascending and disjoint.
 class LinesOverTip {
@@ -73,7 +73,7 @@ public:
     [[nodiscard]] Fibres take() {
         Fibres part;
         for (std::vector<Forbidden>& on_line : forbidden_) {
-            join(on_line);
+            join_ascending(on_line);
             part.intervals.insert(part.intervals.end(), on_line.begin(), on_line.end());
             part.starts.push_back(static_cast<std::uint32_t>(part.intervals.size()));
         }
@@ -102,19 +102,6 @@ private:
         for (; beyond != on_line.end() && beyond->low <= h.high; ++beyond)
             if (beyond->high > at->high) at->high = beyond->high, at->nz_high = beyond->nz_high;
         on_line.erase(at + 1, beyond);
-    }
-
-    static void join(std::vector<Forbidden>& on_line) {
-        std::size_t kept = 0;
-        for (const Forbidden& f : on_line) {
-            if (kept == 0 || f.low > on_line[kept - 1].high + kMergeGap) {
-                on_line[kept++] = f;
-                continue;
-            }
-            Forbidden& last = on_line[kept - 1];
-            if (f.high > last.high) last.high = f.high, last.nz_high = f.nz_high;
-        }
-        on_line.resize(kept);
     }
 
     std::span<const std::int32_t> lines_;
