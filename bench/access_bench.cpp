@@ -247,10 +247,10 @@ void bare_embree(benchmark::State& state) {
 /// those of the facets.
 class Kernel {
 public:
-    Kernel(const Model& m, int threads, std::int64_t profile)
-        : context_({.threads = threads}),
-          scene_(context_, m.mesh.view()),
-          tool_{.profile = static_cast<ToolShape::Profile>(profile), .radius = kRadius, .corner_radius = 1} {
+    Kernel(const Model& m, int threads, std::int64_t form)
+        : context_({.threads = threads}), scene_(context_, m.mesh.view()) {
+        constexpr double corners[] = {0, kRadius, 1};  // of a flat, a ball, a bull-nose
+        tool_.cutter = {kRadius, corners[form], 0};
         options_.spacing = 1000;
         options_.shares = true;  // every facet by itself
         options_.accuracy = 1;

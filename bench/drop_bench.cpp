@@ -39,7 +39,7 @@ const LayerSolid& pattern(std::uint64_t facets) {
     return solid;
 }
 
-void drop_cutter(benchmark::State& state, Cutter cutter) {
+void drop_cutter(benchmark::State& state, CutterShape cutter) {
     const LayerSolid& solid = pattern(static_cast<std::uint64_t>(state.range(0)));
     Context context({.threads = static_cast<int>(state.range(2))});
     constexpr std::size_t n = std::size_t{1} << 17;
@@ -90,12 +90,12 @@ void make_solid(benchmark::State& state) {
 }
 
 const std::vector<std::vector<std::int64_t>> cases{{100'000, 1'000'000}, {random, raster}, {1, 2}};
-BENCHMARK_CAPTURE(drop_cutter, ball_6_35, Cutter{Cutter::Profile::ball, 3.175})
+BENCHMARK_CAPTURE(drop_cutter, ball_6_35, ball_cutter(3.175))
     ->ArgNames({"facets", "raster", "threads"})
     ->ArgsProduct(cases)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(drop_cutter, flat_12_7, Cutter{Cutter::Profile::flat, 6.35})
+BENCHMARK_CAPTURE(drop_cutter, flat_12_7, flat_cutter(6.35))
     ->ArgNames({"facets", "raster", "threads"})
     ->ArgsProduct(cases)
     ->UseRealTime()

@@ -37,8 +37,8 @@ const std::vector<CutSegment>& cuts(int sort) {
     };
     all.resize(1 << 17);
     for (CutSegment& s : all) {
-        s.profile = sort == ball_cuts ? CutterProfile::ball : CutterProfile::flat;
         s.radius_mm = sort == ball_cuts ? 3.175 : 6.35;
+        s.corner_mm = sort == ball_cuts ? s.radius_mm : 0;
         s.helix_rad = std::numbers::pi / 6;
         s.high_mm = sort == ball_cuts ? drawn(0.3, 3.0) : drawn(1, 4);
         s.arc = engagement_arc(s.radius_mm, drawn(0.1, 2.2) * s.radius_mm,
@@ -57,7 +57,7 @@ double operations(const std::vector<CutSegment>& all, bool tooth_once) {
     double sum = 0;
     for (const CutSegment& s : all) {
         const forces::Turn t = forces::make_turn(s);
-        const bool ball = s.profile == CutterProfile::ball;
+        const bool ball = s.ball();
         const double every = ball ? 15 + 6 * 61 : 84, whole = tooth_once ? 52 : every;
         if (tooth_once && t.lag_per_mm * (t.high - t.low) < t.exit - t.entry)
             sum += ball ? 8 * 90 + 12 * 7 : 60;
@@ -151,7 +151,7 @@ void by_hand(const CutSegment& s, SegmentForces& out) {
                 inverse_lag = lag > 0 ? 1 / lag : 0;
     const float entry = static_cast<float>(t.entry), exit = static_cast<float>(t.exit),
                 low = static_cast<float>(t.low), high = static_cast<float>(t.high);
-    const bool ball = s.profile == CutterProfile::ball;
+    const bool ball = s.ball();
     constexpr float node[6] = {-0.93246951f, -0.66120939f, -0.23861919f,
                                0.23861919f,  0.66120939f,  0.93246951f};
     constexpr float weight[6] = {0.17132449f, 0.36076157f, 0.46791393f,
@@ -238,7 +238,7 @@ void by_discs(const CutSegment& s, SegmentForces& out) {
                 kte = static_cast<float>(k.kte), kre = static_cast<float>(k.kre),
                 kae = static_cast<float>(k.kae);
     const float radius = static_cast<float>(s.radius_mm);
-    const bool ball = s.profile == CutterProfile::ball;
+    const bool ball = s.ball();
     const double lag = std::tan(s.helix_rad) / s.radius_mm, pitch = 2 * std::numbers::pi / s.flutes;
     auto edge_at = [&](double z) {
         if (!ball) return z;
@@ -310,7 +310,7 @@ void by_discs(const CutSegment& s, SegmentForces& out) {
 }
 
 void scalar(const CutSegment& s, SegmentForces& out) {
-    out = s.profile == CutterProfile::flat ? closed_form_forces(s) : reference_forces(s);
+    out = s.flat() ? closed_form_forces(s) : reference_forces(s);
 }
 
 /// Stops the program unless the forces are right.

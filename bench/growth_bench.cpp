@@ -27,7 +27,7 @@ namespace slabwright {
 namespace {
 
 constexpr double kBottom = 150, kTop = 168.5;  // of the layer that is looked at, mm
-const Cutter kBall{Cutter::Profile::ball, 3.175};
+const CutterShape kBall = ball_cutter(3.175);
 
 [[noreturn]] void stop(const std::string& why) {
     std::fprintf(stderr, "growth_bench: %s\n", why.c_str());

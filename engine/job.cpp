@@ -209,6 +209,21 @@ bool mills(ToolKind kind) {
     return false;
 }
 
+bool has_corner(ToolKind kind) {
+    switch (kind) {
+        case ToolKind::bull_nose:
+            return true;
+        case ToolKind::flat:
+        case ToolKind::ball:
+        case ToolKind::face:
+        case ToolKind::drill:
+            break;
+    }
+    return false;
+}
+
+double clearing_radius(const Tool& tool) { return tool.diameter / 2 - tool.corner_radius; }
+
 double core_diameter_of(const Tool& tool) {
     constexpr double kFlatShare = 0.3, kFaceShare = 0.8;
     const bool face = tool.kind == ToolKind::face;
@@ -230,7 +245,7 @@ double core_recess(const Tool& tool) {
 }
 
 double clearing_step(const Tool& tool) {
-    return std::min(tool.stepover * tool.diameter, tool.diameter - 2 * tool.corner_radius);
+    return std::min(tool.stepover * tool.diameter, 2 * clearing_radius(tool));
 }
 
 const Tool& tool_of_kind(const Job& job, ToolKind kind) {

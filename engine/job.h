@@ -427,6 +427,11 @@ struct Job {
 /// Whether it can rough a layer, level by level: flat and bull-nose end mills. A bull-nose goes where the
 /// flat around it may; what its corners leave at the foot of walls is for a flat.
 [[nodiscard]] bool roughs_layers(ToolKind kind);
+/// Whether Tool::corner_radius is one of its measures.
+[[nodiscard]] bool has_corner(ToolKind kind);
+/// Of what a tool clears level or meets with from the side, mm: of one with a corner its floor, else the
+/// cutter.
+[[nodiscard]] double clearing_radius(const Tool& tool);
 /// Whether it cuts sideways: all but drills.
 [[nodiscard]] bool mills(ToolKind kind);
 

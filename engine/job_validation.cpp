@@ -45,7 +45,7 @@ void require(const std::string& key, double value, double low, double high, Ends
 }
 
 void validate_corner(const Tool& tool, const std::string& key) {
-    if (tool.kind != ToolKind::bull_nose) {
+    if (!has_corner(tool.kind)) {
         if (tool.corner_radius != 0)
             refuse(key, fmt::format("{} is {}, but the tool is no bull-nose", key, tool.corner_radius),
                    "leave it out, or say kind = \"bull-nose\"");

@@ -19,6 +19,8 @@ using namespace slabwright;
 
 namespace {
 
+CutterShape cutter(bool ball, double radius) { return {radius, ball ? radius : 0, 0}; }
+
 void facet(Mesh& m, Point3 a, Point3 b, Point3 c) {
     for (const Point3& p : {a, b, c}) {
         m.vertices.push_back({static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])});
@@ -235,17 +237,17 @@ TEST(StandingPart, RowsOfMotionsAgreeWithOneAfterTheOther) {
             }
             const double R = ur(random), tolerance = 0.2 + 3 * unit(random),
                          ignore = trial % 2 == 0 ? 1e-5 : 0.0;
-            for (const auto form : {StandingPart::Form::ball, StandingPart::Form::cylinder}) {
+            for (const bool ball : {true, false}) {
                 double most = 0;
                 std::vector<double> depths;
                 for (const auto& [from, to] : motions) {
-                    const bool ball = form == StandingPart::Form::ball;
                     const Penetration p = ball ? part.ball(z_top, from, to, R, ignore)
                                                : part.cylinder(z_top, from, to, R, ignore);
                     depths.push_back(p.depth);
                     most = std::max(most, p.depth);
                 }
-                const StandingPart::Found found = part.deepest(form, z_top, motions, R, ignore, tolerance);
+                const StandingPart::Found found =
+                    part.deepest(cutter(ball, R), z_top, motions, ignore, tolerance);
                 EXPECT_NEAR(found.most.depth, most, 1e-6) << "seed " << seed << " trial " << trial;
                 EXPECT_EQ(found.most.found, most > 0);
                 if (most > 0) {
@@ -285,13 +287,12 @@ TEST(StandingPart, ShortMotionsAfterOneInsideThePartAreFound) {
             at = to;
         }
         const double R = ur(random);
-        for (const auto form : {StandingPart::Form::ball, StandingPart::Form::cylinder}) {
-            const StandingPart::Found found = part.deepest(form, z_top, motions, R, 0, tolerance);
+        for (const bool ball : {true, false}) {
+            const StandingPart::Found found = part.deepest(cutter(ball, R), z_top, motions, 0, tolerance);
             for (std::size_t i = 0; i < motions.size(); ++i) {
                 const auto& [from, to] = motions[i];
-                const double depth = form == StandingPart::Form::ball
-                                         ? part.ball(z_top, from, to, R, 0).depth
-                                         : part.cylinder(z_top, from, to, R, 0).depth;
+                const double depth = ball ? part.ball(z_top, from, to, R, 0).depth
+                                          : part.cylinder(z_top, from, to, R, 0).depth;
                 if (std::abs(depth - tolerance) < 1e-6) continue;
                 ASSERT_EQ(std::binary_search(found.beyond.begin(), found.beyond.end(),
                                              static_cast<std::uint32_t>(i)),
@@ -318,7 +319,6 @@ TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
     for (int trial = 0; trial < 100; ++trial) {
         const double z_top = trial % 4 == 0 ? 6.5 : 100.0, radius = between(0.4, 4);
         const bool is_ball = trial % 2 == 0;
-        const auto form = is_ball ? StandingPart::Form::ball : StandingPart::Form::cylinder;
         std::vector<StandingPart::Motion> motions;
         Point3 at{between(-12, 36), between(-12, 36), between(4, 9)};
         auto go = [&](const Point3& to) {
@@ -371,7 +371,8 @@ TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
             for (auto& [from, to] : raised) from[2] += less, to[2] += less;
             const auto [most, depths] = deepest_of(radius - less, less);
             const double tolerance = left == -1.0 ? 0.3 : std::max(left / 2, 0.0);
-            const StandingPart::Found found = part.deepest(form, z_top, raised, radius - less, 0, tolerance);
+            const StandingPart::Found found =
+                part.deepest(cutter(is_ball, radius - less), z_top, raised, 0, tolerance);
             EXPECT_NEAR(found.most.depth, most, 3e-7)
                 << "seed " << seed << " trial " << trial << " left " << left;
             if (most > 1e-6) {
@@ -405,7 +406,6 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
     const StandingPart part(context, m.view());
     int met = 0;
     for (int trial = 0; trial < 40; ++trial) {
-        const auto form = StandingPart::Form::ball;
         const double radius = 0.5 + 2 * unit(random);
         std::vector<StandingPart::Motion> motions;
         Point3 at{40 * unit(random), 40 * unit(random), 7};
@@ -417,7 +417,7 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
         }
         for (std::size_t i = 0; i < 200; ++i) motions[i + 200] = motions[i];  // every depth twice
         const double tolerance = trial % 3 == 0 ? 0.05 : 10;
-        const StandingPart::Found all = part.deepest(form, 100, motions, radius, 1e-5, tolerance);
+        const StandingPart::Found all = part.deepest(cutter(true, radius), 100, motions, 1e-5, tolerance);
         if (!all.most.found) {  // a way off the relief
             for (const auto& [from, to] : motions)
                 ASSERT_LT(part.ball(100, from, to, radius, 0).depth, 2e-5)
@@ -430,8 +430,8 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
         std::array<StandingPart::Found, 8> found;
         std::atomic<double> known = 0;
         for (const std::size_t row : order)
-            found[row] = part.deepest(form, 100, std::span(motions).subspan(50 * row, 50), radius, 1e-5,
-                                      tolerance, &known);
+            found[row] = part.deepest(cutter(true, radius), 100, std::span(motions).subspan(50 * row, 50),
+                                      1e-5, tolerance, &known);
         Penetration most;
         std::size_t motion = 0, beyond = 0, beyond_alone = 0;
         for (std::size_t row = 0; row < found.size(); ++row) {
@@ -439,9 +439,9 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
                 most = found[row].most, motion = 50 * row + found[row].motion;
             if (tolerance < 1) {
                 beyond += found[row].beyond.size();
-                beyond_alone +=
-                    part.deepest(form, 100, std::span(motions).subspan(50 * row, 50), radius, 1e-5, tolerance)
-                        .beyond.size();
+                beyond_alone += part.deepest(cutter(true, radius), 100,
+                                             std::span(motions).subspan(50 * row, 50), 1e-5, tolerance)
+                                    .beyond.size();
             }
         }
         EXPECT_EQ(most.depth, all.most.depth) << "seed " << seed << " trial " << trial;
@@ -503,10 +503,9 @@ TEST(StandingPart, ChordsOfCirclesAgreeWithSingleQuestions) {
                 for (auto& [from, to] : motions) from[2] += most - 0.003, to[2] += most - 0.003;
             }
         const double tolerance = trial % 2 == 0 ? 0.01 : 10;
-        const StandingPart::Found alone =
-            part.deepest(StandingPart::Form::ball, z_top, motions, R, 1e-5, tolerance);
+        const StandingPart::Found alone = part.deepest(cutter(true, R), z_top, motions, 1e-5, tolerance);
         const StandingPart::Found found =
-            part.deepest(StandingPart::Form::ball, z_top, motions, R, 1e-5, tolerance, nullptr, chords);
+            part.deepest(cutter(true, R), z_top, motions, 1e-5, tolerance, nullptr, chords);
         if (z_top == 100.0) {
             EXPECT_EQ(found.most.depth, alone.most.depth) << "seed " << seed << " trial " << trial;
             EXPECT_EQ(found.motion, alone.motion) << "seed " << seed << " trial " << trial;
@@ -537,13 +536,13 @@ TEST(StandingPart, RowsThatComeDownWithinTheOutlineMeetTheTop) {
     Context context;
     const Mesh m = relief(60, [](double, double) { return 10.0; });
     const StandingPart part(context, m.view());
-    for (const auto form : {StandingPart::Form::ball, StandingPart::Form::cylinder}) {
+    for (const bool ball : {true, false}) {
         std::vector<StandingPart::Motion> motions{{{-3, 30, 60}, {30, 30, 9.5}}};
         for (int i = 0; i < 40; ++i) motions.push_back({motions.back().to, {30, 30 + 0.2 * i, 9.5}});
         motions.push_back({motions.back().to, {80, 30, 60}});
         for (const std::size_t count : {std::size_t{1}, std::size_t{2}, motions.size()}) {
             const StandingPart::Found found =
-                part.deepest(form, 10, std::span(motions).first(count), 2, 1e-5, 0.01);
+                part.deepest(cutter(ball, 2), 10, std::span(motions).first(count), 1e-5, 0.01);
             EXPECT_NEAR(found.most.depth, 0.5 - StandingPart::kSheet, 1e-6);
             EXPECT_EQ(found.beyond.size(), count);
         }

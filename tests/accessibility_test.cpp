@@ -19,18 +19,11 @@ using namespace slabwright;
 
 namespace {
 
-using Profile = ToolShape::Profile;
-
-ToolShape flat(double radius) { return {.profile = Profile::flat, .radius = radius}; }
-ToolShape ball(double radius) { return {.profile = Profile::ball, .radius = radius}; }
-ToolShape bull_nose(double radius, double corner) {
-    return {.profile = Profile::bull_nose, .radius = radius, .corner_radius = corner};
-}
+ToolShape flat(double radius) { return {.cutter = flat_cutter(radius)}; }
+ToolShape ball(double radius) { return {.cutter = ball_cutter(radius)}; }
+ToolShape bull_nose(double radius, double corner) { return {.cutter = {radius, corner, 0}}; }
 ToolShape tapered_ball(double radius, double tip, double degrees) {
-    return {.profile = Profile::tapered_ball,
-            .radius = radius,
-            .corner_radius = tip,
-            .taper_rad = degrees * std::numbers::pi / 180};
+    return {.cutter = {radius, tip, degrees * std::numbers::pi / 180}};
 }
 
 /// Columns of square cells with upright walls between them.
@@ -141,7 +134,7 @@ namespace {
 /// grown by `cover`. Offsets are taken from a dense outline, point by point.
 class Outline {
 public:
-    Outline(const ToolShape& tool, double depth, double cover) : radius_(tool.radius) {
+    Outline(const ToolShape& tool, double depth, double cover) : radius_(tool.cutter.radius) {
         std::vector<std::array<double, 2>> line;  // of the un-eroded tool: distance, height
         constexpr int steps = 1500;
         for (int i = -steps; i <= steps; ++i) {
@@ -174,16 +167,13 @@ public:
 
 private:
     static double height(const ToolShape& tool, double d) {
-        const double r = tool.profile == Profile::ball   ? tool.radius
-                         : tool.profile == Profile::flat ? 0
-                                                         : tool.corner_radius;
-        if (tool.profile == Profile::tapered_ball) {
-            const double tangent = r * std::cos(tool.taper_rad);
-            if (d > tangent)
-                return r - r * std::sin(tool.taper_rad) + (d - tangent) / std::tan(tool.taper_rad);
+        const auto& [radius, r, taper] = tool.cutter;
+        if (taper > 0) {
+            const double tangent = r * std::cos(taper);
+            if (d > tangent) return r - r * std::sin(taper) + (d - tangent) / std::tan(taper);
             return r - std::sqrt(r * r - d * d);
         }
-        const double x = d - (tool.radius - r);
+        const double x = d - (radius - r);
         return x <= 0 ? 0 : r - std::sqrt(std::max(0.0, r * r - x * x));
     }
     [[nodiscard]] double at(const std::vector<double>& table, double d) const {
@@ -202,14 +192,14 @@ public:
     static constexpr double kCell = 0.1;
     DensePlaces(const StandingPart& part, double size, double z_top, const ToolShape& tool, double depth,
                 double cover)
-        : outline_(tool, depth, cover), reach_(tool.radius + cover) {
+        : outline_(tool, depth, cover), reach_(tool.cutter.radius + cover) {
         constexpr double room = 4;
         low_ = -room;
         n_ = static_cast<int>((size + 2 * room) / kCell);
         std::vector<float> columns(static_cast<std::size_t>(n_) * n_);
         RisingEnvelope(part, low_, low_, kCell, n_, n_).at(z_top, -1e6f, columns.data());
         tips_.assign(columns.size(), -1e6f);
-        const int r = static_cast<int>(tool.radius / kCell) + 1;
+        const int r = static_cast<int>(tool.cutter.radius / kCell) + 1;
         for (int dj = -r; dj <= r; ++dj)
             for (int di = -r; di <= r; ++di) {
                 const double under = outline_.shrunk(std::hypot(di, dj) * kCell);
@@ -350,13 +340,12 @@ TEST(Accessibility, OfRandomPartsAgainstDensePlaces) {
                 const bool kernel = scene.reaches(z_top, s.p, s.n, tool, options);
                 const bool may = generous.reach(s.p), must = strict.reach(s.p);
                 if (kernel)
-                    EXPECT_TRUE(may) << "part " << part << " profile " << static_cast<int>(tool.profile)
-                                     << " facet " << s.facet << " at " << s.p[0] << ", " << s.p[1] << ", "
-                                     << s.p[2];
+                    EXPECT_TRUE(may) << "part " << part << " of " << name_of(tool.cutter.form()) << " facet "
+                                     << s.facet << " at " << s.p[0] << ", " << s.p[1] << ", " << s.p[2];
                 else
                     EXPECT_FALSE(must)
-                        << "part " << part << " profile " << static_cast<int>(tool.profile) << " facet "
-                        << s.facet << " at " << s.p[0] << ", " << s.p[1] << ", " << s.p[2];
+                        << "part " << part << " of " << name_of(tool.cutter.form()) << " facet " << s.facet
+                        << " at " << s.p[0] << ", " << s.p[1] << ", " << s.p[2];
                 // What a plate hangs over is not in the facet's share.
                 const bool hung_over = standing.envelope(s.p[0], s.p[1], z_top, -1) > s.p[2] + 0.01;
                 const float share = shares.empty() || hung_over ? -1 : shares[s.facet];

@@ -147,7 +147,7 @@ TEST(BullNose, WhatMayStandAfterItIsABound) {
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> place(-4, 44), up(0.5, 14), step(-8, 8);
     constexpr double top = 15;
-    const Cutter cutter = cutter_of({6, 2, 0});
+    const CutterShape cutter{6, 2, 0};
     const CutterEnd end = cutter_end({6, 2, 0});
     const CellGrid grid{0.003, 0.004, 0.0917, 436, 436};
     for (int trial = 0; trial < 4; ++trial) {

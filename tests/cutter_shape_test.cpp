@@ -6,11 +6,13 @@
 #include <gtest/gtest.h>
 
 #include "engine/job.h"
-#include "kernels/cutting/cutter.h"
+#include "kernels/access/standing_part.h"
 #include "kernels/cutting/tool_shape.h"
 #include "kernels/errors.h"
 #include "kernels/forces/forces.h"
+#include "kernels/mesh/weld.h"
 #include "kernels/stock/sweep.h"
+#include "tests/mesh_shapes.h"
 
 using namespace slabwright;
 
@@ -27,30 +29,30 @@ TEST(CutterShape, FormFollowsFromRadiusCornerAndTaper) {
     EXPECT_EQ(kCone.form(), CutterForm::cone);
 }
 
-TEST(CutterShape, EachKernelTakesWhatItCanCutWithAndRefusesTheRest) {
-    EXPECT_EQ(cutter_of(kFlat).profile, Cutter::Profile::flat);
-    EXPECT_EQ(cutter_of(kBall).profile, Cutter::Profile::ball);
+TEST(CutterShape, KernelsTakeWhatTheyCanCutWithAndRefuseTheRest) {
     EXPECT_EQ(cutter_end(kFlat).form, CutterEnd::Form::flat);
     EXPECT_EQ(cutter_end(kBall).form, CutterEnd::Form::ball);
     EXPECT_EQ(cutter_end(kCone).form, CutterEnd::Form::cone);
-    EXPECT_EQ(cutter_profile(kFlat), CutterProfile::flat);
-    EXPECT_EQ(cutter_profile(kBall), CutterProfile::ball);
-    EXPECT_EQ(tool_shape(kBullNose).profile, ToolShape::Profile::bull_nose);
-    EXPECT_EQ(tool_shape(kTapered).profile, ToolShape::Profile::tapered_ball);
-    EXPECT_EQ(cutter_profile(kBullNose), CutterProfile::bull_nose);
     EXPECT_EQ(cutter_end(kBullNose).form, CutterEnd::Form::other);
     EXPECT_EQ(cutter_end(kTapered).form, CutterEnd::Form::other);
-    for (const CutterShape& shape : {kBullNose, kTapered, kCone})
-        EXPECT_EQ(cutter_of(shape).profile, Cutter::Profile::other);
-    for (const CutterShape& shape : {kTapered, kCone}) EXPECT_THROW((void)cutter_profile(shape), Error);
-    EXPECT_THROW((void)tool_shape(kCone), Error);
+    EXPECT_TRUE(segment_of(kFlat).flat() && !segment_of(kFlat).ball());
+    EXPECT_TRUE(segment_of(kBall).ball() && !segment_of(kBall).flat());
+    EXPECT_FALSE(segment_of(kBullNose).flat() || segment_of(kBullNose).ball());
+    for (const CutterShape& shape : {kTapered, kCone}) EXPECT_THROW((void)segment_of(shape), Error);
+    EXPECT_NO_THROW(check_tool_shape({.cutter = kTapered}));
+    EXPECT_THROW(check_tool_shape({.cutter = kCone}), Error);
+    Context context;
+    const StandingPart part(context, weld(context, shapes::box({0, 0, 0}, {20, 20, 9})).view());
+    for (const CutterShape& shape : {kTapered, kCone})
+        EXPECT_THROW((void)part.depth(shape, 9, {0, 0, 5}, {5, 0, 5}, 0), Error);
+    for (const CutterShape& shape : {kFlat, kBall, kBullNose})
+        EXPECT_NEAR(part.depth(shape, 9, {10, 10, 8}, {11, 10, 8}, 0).depth, 1 - StandingPart::kSheet, 1e-6);
 }
 
 // The height of a cutter's end over its tip, as each kernel has it, is one.
 TEST(CutterShape, KernelsAgreeOnTheUnderSide) {
     for (const CutterShape& shape : {kFlat, kBall}) {
-        ToolShape tool = tool_shape(shape);
-        tool.shank_radius = shape.radius;
+        const ToolShape tool{.cutter = shape, .shank_radius = shape.radius};
         const Envelope under = envelopes(tool).front();
         for (const double r : {0.0, 1.0, 3.0, 5.5}) {
             const double expected = shape.form() == CutterForm::ball

@@ -55,8 +55,8 @@ double distance_to(const Vec3d& p, const std::array<Vec3d, 3>& t) {
 // How much room the cutter has: distance of its axis (ball centre and up, disc and up) from the mesh cut off
 // at z_top, less its radius; negative where it touches. Facets are lifted flat to the cutter's level where
 // they stand above it.
-double room(const Mesh& mesh, double z_top, const Cutter& cutter, double x, double y, double tip) {
-    const bool ball = cutter.profile == Cutter::Profile::ball;
+double room(const Mesh& mesh, double z_top, const CutterShape& cutter, double x, double y, double tip) {
+    const bool ball = cutter.is_ball();
     const double zc = ball ? tip + cutter.radius : tip;
     if (tip >= z_top) return 1e9;
     double nearest = 1e9;
@@ -110,17 +110,17 @@ double room(const Mesh& mesh, double z_top, const Cutter& cutter, double x, doub
     return nearest - cutter.radius;
 }
 
-class Cutting : public testing::TestWithParam<std::tuple<int, Cutter::Profile>> {};
+class Cutting : public testing::TestWithParam<std::tuple<int, bool>> {};
 
 TEST_P(Cutting, ContoursTouchAndSpareThePart) {
-    const auto [seed, profile] = GetParam();
+    const auto [seed, is_flat] = GetParam();
     std::printf("seed %d\n", seed);
     Context context;
     const Mesh mesh = test::random_height_field(context, 6, 3.0, 12, seed % 2 ? 0.5 : 2.0,
                                                 static_cast<std::uint32_t>(seed));
     const double z_top = seed % 3 == 0 ? 8.0 : 12.5;
     const LayerSolid solid = layer_solid(context, mesh.view(), -5, z_top);
-    const Cutter cutter{profile, 2.0};
+    const CutterShape cutter = is_flat ? flat_cutter(2) : ball_cutter(2);
     const std::int32_t pitch = 2000;  // 0.2 mm
     const double miss = 0.2 * 0.2 / (4 * cutter.radius) + 1e-4;
     std::mt19937 random(static_cast<std::uint32_t>(seed));
@@ -165,14 +165,14 @@ TEST_P(Cutting, ContoursTouchAndSpareThePart) {
 
 // Levels found from one another against each by itself; the torus overhangs itself.
 TEST_P(Cutting, LevelsTogetherForbidWhatEachDoes) {
-    const auto [number, profile] = GetParam();
+    const auto [number, is_flat] = GetParam();
     std::mt19937 random(test::seed() + static_cast<std::uint32_t>(number));
     Context context;
     Mesh mesh = number % 3 == 0 ? weld(context, shapes::torus(24, 9, 4))
                                 : test::random_height_field(context, 20, 1.0, 12, number % 2 ? 0.5 : 2.0,
                                                             static_cast<std::uint32_t>(random()));
     const LayerSolid solid = layer_solid(context, mesh.view(), -5, number % 2 ? 3.5 : 12.5);
-    const Cutter cutter{profile, 2.0};
+    const CutterShape cutter = is_flat ? flat_cutter(2) : ball_cutter(2);
     std::vector<double> tips;
     for (int k = 0; k < 12; ++k) tips.push_back(static_cast<double>(random() % 16000) / 1000 - 4);
     tips.push_back(tips[3]);
@@ -203,14 +203,14 @@ TEST_P(Cutting, LevelsTogetherForbidWhatEachDoes) {
 }
 
 TEST_P(Cutting, DropRestsOnThePart) {
-    const auto [seed, profile] = GetParam();
+    const auto [seed, is_flat] = GetParam();
     std::printf("seed %d\n", seed);
     Context context;
     const Mesh mesh = test::random_height_field(context, 6, 3.0, 12, seed % 2 ? 0.5 : 2.0,
                                                 static_cast<std::uint32_t>(seed));
     const double z_top = seed % 3 == 0 ? 8.0 : 12.5;
     const LayerSolid solid = layer_solid(context, mesh.view(), -5, z_top);
-    const Cutter cutter{profile, 2.0};
+    const CutterShape cutter = is_flat ? flat_cutter(2) : ball_cutter(2);
     const DropIndex index(solid, cutter);
     std::mt19937 random(static_cast<std::uint32_t>(seed));
     for (int k = 0; k < 150; ++k) {
@@ -230,7 +230,7 @@ TEST_P(Cutting, DropRestsOnThePart) {
 // Many facets under one cutter, which the solid's tree must leave out or find: tiny ones, large ones beside
 // them, upright walls and equal heights, and all of it a metre away from the origin.
 TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
-    const auto [number, profile] = GetParam();
+    const auto [number, is_flat] = GetParam();
     std::mt19937 random(test::seed() + static_cast<std::uint32_t>(number));
     auto uniform = [&](double low, double high) {
         return low + (high - low) * (static_cast<double>(random()) / 4294967296.0);
@@ -267,7 +267,7 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
     // What was met at the places before changes nothing.
     int nearly = 0;
     for (const double r : {0.4, 3.0, 12.0}) {
-        const DropIndex index(solid, {profile, r});
+        const DropIndex index(solid, is_flat ? flat_cutter(r) : ball_cutter(r));
         MetPoints met;
         double x = away.x, y = away.y;
         for (int k = 0; k < 200; ++k) {
@@ -293,7 +293,7 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
     }
     EXPECT_GT(nearly, 100);
     for (const double r : {0.4, 3.0, 12.0}) {
-        const Cutter cutter{profile, r};
+        const CutterShape cutter = is_flat ? flat_cutter(r) : ball_cutter(r);
         const DropIndex index(solid, cutter);
         for (int k = 0; k < 40; ++k) {
             // Some of the places lie right over edges and vertices.
@@ -352,8 +352,7 @@ TEST(Drops, WhereAWiderEndMillMeetsNothingNorDoesANarrowOneAround) {
     });
     const LayerSolid solid = layer_solid(context, mesh.view(), -20, 3.5);
     constexpr double r = 0.8, half = 0.6, rounding = 1e-6;
-    const DropIndex narrow(solid, {Cutter::Profile::flat, r}),
-        wide(solid, {Cutter::Profile::flat, r + half + rounding});
+    const DropIndex narrow(solid, flat_cutter(r)), wide(solid, flat_cutter(r + half + rounding));
     int free = 0;
     for (int k = 0; k < 4000; ++k) {
         const double x = uniform(-7, 7), y = uniform(-7, 7), z = k % 2 ? 1.001 : uniform(0, 4);
@@ -374,7 +373,7 @@ TEST(Drops, SameBytesOnAnyNumberOfThreads) {
         Context context({.threads = threads});
         const Mesh mesh = test::random_height_field(context, 150, 0.5, 12, 0.5, 7);
         const LayerSolid solid = layer_solid(context, mesh.view(), -5, 9);
-        const DropIndex index(solid, {Cutter::Profile::ball, 3.0});
+        const DropIndex index(solid, ball_cutter(3.0));
         std::vector<float>& result = results.emplace_back();
         for (double y = -40; y <= 40; y += 1.25)
             for (double x = -40; x <= 40; x += 0.25) {
@@ -423,9 +422,7 @@ TEST(Drops, CapCellsKnowTheInsideAsWindingDoes) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, Cutting,
-                         testing::Combine(testing::Range(1, 7),
-                                          testing::Values(Cutter::Profile::ball, Cutter::Profile::flat)));
+INSTANTIATE_TEST_SUITE_P(Random, Cutting, testing::Combine(testing::Range(1, 7), testing::Bool()));
 
 // A flange whose underside float32 puts a hair under the layer's top is no part of the layer: neither are its
 // facets there, nor may its section be, or the contours around it would run off the grid.
@@ -435,7 +432,7 @@ TEST(Fibres, AFlangeThatBeginsAtTheTopIsNoneOfTheLayer) {
     for (const auto& f : shapes::box({-30, -30, 9.9996F}, {60, 60, 15})) facets.push_back(f);
     const Mesh mesh = weld(context, facets);
     const LayerSolid solid = layer_solid(context, mesh.view(), 0, 10);
-    const Cutter cutter{Cutter::Profile::ball, 3.0};
+    const CutterShape cutter = ball_cutter(3.0);
     for (const double tip : {4.0, 6.9999, 7.5, 9.5}) {
         const Plane plane = inside_plane(solid, cutter, tip);
         const Contours contours =
@@ -468,8 +465,8 @@ TEST(Fibres, WhatACutterCanTouchEndsAllThatIsForbidden) {
         for (const GroupCorners& group : solid.corners)
             for (const auto& corner : group.corner.high)
                 for (const std::int8_t up : corner[2]) turned += up > 0 && up < 127;
-        const Cutter cutter{trial < 24 ? Cutter::Profile::ball : Cutter::Profile::flat,
-                            trial % 5 == 0 ? 0.7 : 3.0};
+        const double radius = trial % 5 == 0 ? 0.7 : 3.0;
+        const CutterShape cutter = trial < 24 ? ball_cutter(radius) : flat_cutter(radius);
         std::vector<double> tips;
         for (int k = 0; k < 10; ++k) tips.push_back(static_cast<double>(random() % 12000) / 1000 - 4);
         if (const float corner = mesh.vertices[random() % mesh.vertices.size()].z; corner < solid.z_top)
@@ -623,15 +620,14 @@ TEST(LayerSolid, WhatIsNearSufficesForTheContoursThere) {
         const Mesh mesh = test::random_height_field(context, 24, 3.0, 12, trial % 2 ? 0.5 : 2.0,
                                                     static_cast<std::uint32_t>(random()));
         const LayerSolid solid = layer_solid(context, mesh.view(), -5, 12.5);
-        const Cutter cutter{trial % 3 == 0 ? Cutter::Profile::flat : Cutter::Profile::ball, 2.0};
+        const CutterShape cutter = trial % 3 == 0 ? flat_cutter(2) : ball_cutter(2);
         std::vector<SolidFacet> chosen;
         const Vec3d middle = solid.facets[random() % solid.facets.size()].p[0];
         for (const SolidFacet& f : solid.facets)
             if (std::hypot(f.p[0][0] - middle[0], f.p[0][1] - middle[1]) < 5 && f.nz > 0.5)
                 chosen.push_back(f);
-        const bool ball =
-            cutter.profile ==
-            Cutter::Profile::ball;  // where a disc touches two facets in one place, either tells its nz
+        // Where a disc touches two facets in one place, either tells its nz.
+        const bool ball = cutter.is_ball();
         const LayerSolid near = solid_near(context, solid, chosen, 2 * cutter.radius + 2 * 0.25);
         left_out += solid.facets.size() - near.facets.size();
         const FibreGrid grid = fibre_grid(solid, cutter, 2500);
@@ -675,7 +671,7 @@ TEST(Fibres, SameBytesOnAnyNumberOfThreads) {
         Context context({.threads = threads});
         const Mesh mesh = test::random_height_field(context, 20, 2.0, 12, 0.5, 7);
         const LayerSolid solid = layer_solid(context, mesh.view(), -5, 9);
-        const Cutter cutter{Cutter::Profile::ball, 3.0};
+        const CutterShape cutter = ball_cutter(3.0);
         const Plane plane = inside_plane(solid, cutter, 4);
         const auto inside = slice(context, mesh.view(), {&plane, 1});
         results.push_back(

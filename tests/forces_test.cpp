@@ -41,12 +41,12 @@ double drawn(std::mt19937_64& random, double low, double high) {
     return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
 }
 
-CutSegment random_cut(std::mt19937_64& random, CutterProfile profile) {
+CutSegment random_cut(std::mt19937_64& random, CutterForm form) {
     CutSegment s;
-    s.profile = profile;
     s.flutes = 1 + static_cast<int>(random() % 6);
     s.radius_mm = drawn(random, 1, 26);
-    if (profile == CutterProfile::bull_nose) s.corner_mm = drawn(random, 0.05, 1) * s.radius_mm;
+    if (form == CutterForm::bull_nose) s.corner_mm = drawn(random, 0.05, 1) * s.radius_mm;
+    if (form == CutterForm::ball) s.corner_mm = s.radius_mm;
     s.helix_rad = random() % 5 == 0 ? 0 : drawn(random, 0, kPi / 3);
     s.high_mm = std::exp(drawn(random, std::log(0.01), std::log(3.0))) * s.radius_mm;
     s.low_mm = random() % 3 == 0 ? drawn(random, 0, 0.9) * s.high_mm : 0;
@@ -80,15 +80,15 @@ struct Discs {
 // Where disc i of n lies, how much edge it has and at what slope.
 double disc_height(const CutSegment& s, int i, int n, double& db, double& kappa) {
     // Equal steps of the edge's slope on a rounding, of height on the rest.
-    const double corner = s.profile == CutterProfile::bull_nose ? s.corner_mm : s.radius_mm;
+    const double corner = s.flat() ? s.radius_mm : s.corner_mm;
     auto edge = [&](double h) {
-        if (s.profile == CutterProfile::flat) return h;
+        if (s.flat()) return h;
         return h < corner ? corner * std::acos(1 - h / corner) : corner * kPi / 2 + h - corner;
     };
     const double low = edge(s.low_mm), high = edge(s.high_mm), e = low + (high - low) * (i + 0.5) / n;
     db = (high - low) / n;
     kappa = kPi / 2;
-    if (s.profile == CutterProfile::flat) return e;
+    if (s.flat()) return e;
     if (e >= corner * kPi / 2) return e - corner * kPi / 2 + corner;
     kappa = e / corner;
     return corner * (1 - std::cos(kappa));
@@ -100,7 +100,7 @@ void add_disc(Discs& f, const CutSegment& s, double phi, double kappa, double db
     f.x += -t * std::cos(phi) - (r * std::sin(kappa) + a * std::cos(kappa)) * std::sin(phi);
     f.y += t * std::sin(phi) - (r * std::sin(kappa) + a * std::cos(kappa)) * std::cos(phi);
     f.z += a * std::sin(kappa) - r * std::cos(kappa);
-    const double corner = s.profile == CutterProfile::bull_nose ? s.corner_mm : s.radius_mm;
+    const double corner = s.flat() ? s.radius_mm : s.corner_mm;
     f.torque += t * (s.radius_mm - corner + corner * std::sin(kappa));
 }
 
@@ -142,14 +142,14 @@ TEST(Forces, ReferenceAgreesWithDiscs) {
     std::mt19937_64 random(seed);
     double worst = 0;
     for (int i = 0; i < 60; ++i) {
-        const CutSegment s = random_cut(random, static_cast<CutterProfile>(i % 3));
+        const CutSegment s = random_cut(random, static_cast<CutterForm>(i % 3));
         const SegmentForces f = reference_forces(s, 1e-4);
         Discs peak, mean;
         double plane = 0, all = 0, mean_plane = 0;
-        const int angles = s.profile == CutterProfile::bull_nose ? 2880 : 720;
+        const bool bull_nose = !s.flat() && !s.ball();
+        const int angles = bull_nose ? 2880 : 720;
         for (int k = 0; k < angles; ++k) {
-            const Discs d =
-                discs(s, 2 * kPi * (k + 0.37) / angles, s.profile == CutterProfile::bull_nose ? 1000 : 500);
+            const Discs d = discs(s, 2 * kPi * (k + 0.37) / angles, bull_nose ? 1000 : 500);
             peak.x = std::max(peak.x, std::abs(d.x)), peak.y = std::max(peak.y, std::abs(d.y)),
             peak.z = std::max(peak.z, std::abs(d.z));
             peak.torque = std::max(peak.torque, std::abs(d.torque));
@@ -182,7 +182,7 @@ TEST(Forces, ReferenceAgreesWithDiscs) {
 TEST(Forces, MeansAreTheIntegralsOverArcAndEdge) {
     std::mt19937_64 random(12);
     for (int i = 0; i < 40; ++i) {
-        const CutSegment s = random_cut(random, static_cast<CutterProfile>(i % 3));
+        const CutSegment s = random_cut(random, static_cast<CutterForm>(i % 3));
         const int n = 400;
         Discs mean;
         for (int d = 0; d < n; ++d) {
@@ -206,7 +206,7 @@ TEST(Forces, ReferenceIsTheClosedFormWithoutHelix) {
     SCOPED_TRACE(seed);
     std::mt19937_64 random(seed);
     for (int i = 0; i < 300; ++i) {
-        CutSegment s = random_cut(random, CutterProfile::flat);
+        CutSegment s = random_cut(random, CutterForm::flat);
         s.helix_rad = 0;
         const SegmentForces a = reference_forces(s, 1e-4), b = closed_form_forces(s, 1e-4);
         for (const auto member :
@@ -221,7 +221,7 @@ TEST(Forces, ReferenceIsTheClosedFormWithHelix) {
     std::mt19937_64 random(8);
     double worst = 0;
     for (int i = 0; i < 300; ++i) {
-        const CutSegment s = random_cut(random, CutterProfile::flat);
+        const CutSegment s = random_cut(random, CutterForm::flat);
         const SegmentForces a = reference_forces(s, 1e-3), b = closed_form_forces(s, 1e-3);
         for (const auto member : {&SegmentForces::peak_x_n, &SegmentForces::peak_y_n,
                                   &SegmentForces::peak_z_n, &SegmentForces::peak_resultant_n})
@@ -233,7 +233,7 @@ TEST(Forces, ReferenceIsTheClosedFormWithHelix) {
 TEST(Forces, PeaksAreFoundToTheStatedAccuracy) {
     std::mt19937_64 random(9);
     for (int i = 0; i < 100; ++i) {
-        const CutSegment s = random_cut(random, i % 2 ? CutterProfile::ball : CutterProfile::flat);
+        const CutSegment s = random_cut(random, i % 2 ? CutterForm::ball : CutterForm::flat);
         const SegmentForces exact = reference_forces(s, 1e-7);
         for (const double accuracy : {1e-2, 1e-3, 1e-4}) {
             const SegmentForces f = reference_forces(s, accuracy);
@@ -304,7 +304,7 @@ TEST(Forces, SegmentsOutOfRangeAreRefused) {
     EXPECT_TRUE(refused([](CutSegment& s) { s.spindle_rpm = -1; }));
     EXPECT_TRUE(refused([&](CutSegment& s) { s.coefficients.kae = nan; }));
     CutSegment ball = slot_of_luo();
-    ball.profile = CutterProfile::ball;
+    ball.corner_mm = ball.radius_mm;
     EXPECT_THROW((void)closed_form_forces(ball), Error);
 }
 
@@ -326,9 +326,9 @@ TEST(ForceSolver, DeviceIsTheReferenceWithin1e4OfThePeak) {
     }
     std::vector<CutSegment> cuts(10000);
     for (std::size_t i = 0; i < cuts.size(); ++i)
-        cuts[i] = random_cut(random, i % 50 == 49 ? CutterProfile::bull_nose
-                                     : i % 2      ? CutterProfile::ball
-                                                  : CutterProfile::flat);
+        cuts[i] = random_cut(random, i % 50 == 49 ? CutterForm::bull_nose
+                                     : i % 2      ? CutterForm::ball
+                                                  : CutterForm::flat);
     std::vector<SegmentForces> found(cuts.size());
     solver.solve(context, cuts, found);
     double worst[2] = {0, 0};
@@ -349,7 +349,7 @@ TEST(ForceSolver, StreamsAnyNumberInOrder) {
     std::mt19937_64 random(11);
     std::vector<CutSegment> few(97);
     for (std::size_t i = 0; i < few.size(); ++i)
-        few[i] = random_cut(random, i % 2 ? CutterProfile::ball : CutterProfile::flat);
+        few[i] = random_cut(random, i % 2 ? CutterForm::ball : CutterForm::flat);
     std::vector<CutSegment> cuts(100003);
     for (std::size_t i = 0; i < cuts.size(); ++i) cuts[i] = few[i % few.size()];
     Context all, one({.threads = 1});
@@ -414,11 +414,10 @@ TEST(HardestCuts, AreTheSameWithADeviceAndWithout) {
     std::vector<CutSegment> cuts;
     std::vector<std::size_t> starts{0};
     for (int g = 0; g < 40; ++g) {
-        const CutSegment like = random_cut(random, g % 2 ? CutterProfile::ball : CutterProfile::flat);
+        const CutSegment like = random_cut(random, g % 2 ? CutterForm::ball : CutterForm::flat);
         const std::size_t n = random() % 300;
         for (std::size_t i = 0; i < n; ++i) {
-            cuts.push_back(g % 3 ? like
-                                 : random_cut(random, g % 2 ? CutterProfile::ball : CutterProfile::flat));
+            cuts.push_back(g % 3 ? like : random_cut(random, g % 2 ? CutterForm::ball : CutterForm::flat));
             if (g % 3) cuts.back().chip_load_mm *= 1 - drawn(random, 0, 1e-4);
             if (g % 3 == 2 && i % 2) cuts.back() = cuts[starts.back()];
         }
@@ -474,7 +473,7 @@ TEST(PeakForce, IsThatOfTheClosedFormOrTheReference) {
     CutSegment s = slot_of_luo();
     EXPECT_EQ(peak_force(s).peak_resultant_n, closed_form_forces(s, 1e-5).peak_resultant_n);
     EXPECT_EQ(peak_force(s).peak_axial_n, closed_form_forces(s, 1e-5).peak_z_n);
-    s.profile = CutterProfile::ball;
+    s.corner_mm = s.radius_mm;
     EXPECT_EQ(peak_force(s).peak_resultant_n, reference_forces(s, 1e-5).peak_resultant_n);
     EXPECT_GT(peak_force(s).power_w, 0);
 }

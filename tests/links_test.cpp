@@ -42,7 +42,7 @@ struct Bench {
         : mesh(box(context)),
           layer(),
           cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, {}, nullptr, {}},
-          part(cut.solid, {Cutter::Profile::flat, 5}) {
+          part(cut.solid, flat_cutter(5)) {
         tool.diameter = 10;
         layer.mesh = mesh.view();
         layer.job = &job;
@@ -53,7 +53,7 @@ struct Bench {
     }
     // Everything at least 5 mm from the box, down to z.
     void clear(double z) {
-        const Cutter cutter{Cutter::Profile::flat, 5};
+        const CutterShape cutter = flat_cutter(5);
         for (double y = -30; y <= 50; y += 2)
             for (double x = -30; x <= 50; x += 2)
                 if (part.drop(x, y).tip_z <= z) standing.cut(cutter, {x, y, z}, {x, y, z});
@@ -263,7 +263,7 @@ TEST(Links, ABallKeepsItsAllowanceOverWhatLiesFlat) {
     for (const double over : {0.2, 0.25, 0.35}) {
         Bench bench;
         bench.tool.kind = ToolKind::ball;
-        const DropIndex wider(bench.cut.solid, {Cutter::Profile::ball, 5 + kAllowance});
+        const DropIndex wider(bench.cut.solid, ball_cutter(5 + kAllowance));
         PathBuilder path(bench.operation, bench.tool, 3000, kClearance, kLink);
         path.set_surroundings(bench.cut.around(bench.tool, &wider));
         path.follow(line(-9, 10, -8, 10, kTop + over));
@@ -308,7 +308,7 @@ TEST(Links, ARunWithoutRoomIsLeftByAToolThatDoesNotPlunge) {
 TEST(Links, APlaceWithoutRoomForARampIsEnteredFromWhereItIsCleared) {
     Bench bench;
     bench.tool.plunges = false;
-    bench.standing.cut({Cutter::Profile::flat, 5}, {-30, -20, 10}, {-20, -20, 10});
+    bench.standing.cut(flat_cutter(5), {-30, -20, 10}, {-20, -20, 10});
     PathBuilder path = bench.builder();
     path.follow(std::vector<PathPoint>{{to_units(-17), to_units(-20), to_units(10)}});
     EXPECT_TRUE(bench.cut.no_way_in.empty());

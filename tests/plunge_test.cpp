@@ -81,7 +81,7 @@ struct Bench {
           layer(),
           tool(with),
           cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, {}, nullptr, {}},
-          part(cut.solid, {Cutter::Profile::flat, with.diameter / 2}) {
+          part(cut.solid, flat_cutter(with.diameter / 2)) {
         layer.mesh = mesh.view();
         layer.job = &job;
         layer.z_top = kTop;
@@ -91,7 +91,7 @@ struct Bench {
         stock.add_slab(0, kTop);
     }
     void slot(double radius, const std::array<double, 3>& from, const std::array<double, 3>& to) {
-        standing.cut({Cutter::Profile::flat, radius}, from, to);
+        standing.cut(flat_cutter(radius), from, to);
         stock.cut({CutterEnd::Form::flat, radius, 0}, from, to);
     }
     [[nodiscard]] bool free(const PathPoint& a, const PathPoint& b) const {

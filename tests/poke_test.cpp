@@ -47,13 +47,12 @@ Triangle draw(std::mt19937& random, int trial, const Point3& about) {
 TEST(Poke, FacetsReachIntoToolsWhereTheirPointsDo) {
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> place(-50, 50);
-    using Profile = ToolShape::Profile;
     const ToolShape tools[] = {
-        {.profile = Profile::flat, .radius = 2},
-        {.profile = Profile::ball, .radius = 2.5},
-        {.profile = Profile::bull_nose, .radius = 3, .corner_radius = 1},
-        {.profile = Profile::tapered_ball, .radius = 2.5, .corner_radius = 1, .taper_rad = 0.3},
-        {.profile = Profile::flat, .radius = 1, .flute_length = 2, .shank_radius = 2},
+        {.cutter = flat_cutter(2)},
+        {.cutter = ball_cutter(2.5)},
+        {.cutter = {3, 1, 0}},
+        {.cutter = {2.5, 1, 0.3}},
+        {.cutter = flat_cutter(1), .flute_length = 2, .shank_radius = 2},
     };
     constexpr double rounding = 2e-6;
     int poke = 0, miss = 0;

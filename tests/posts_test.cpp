@@ -30,6 +30,7 @@
 #include "io/write/sequence_json.h"
 #include "kernels/errors.h"
 #include "tests/support/block_build.h"
+#include "tests/support/every_control.h"
 #include "tests/support/files.h"
 #include "tests/support/grbl_toolpath.h"
 #include "tests/support/rs274.h"
@@ -38,21 +39,11 @@
 #include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
-using slabwright::support::schema_complaint;
-using slabwright::support::slurp;
-using slabwright::support::spit;
-using slabwright::support::TemporaryFolder;
+using namespace slabwright::support;
 
 namespace {
 
-const std::vector<Post> kPosts = [] {
-    std::vector<Post> all;
-    for (const Control& control : kControls) all.push_back(control.post);
-    return all;
-}();
-constexpr LengthUnit kUnits[] = {LengthUnit::mm, LengthUnit::inch};
 constexpr double kNear = 0.5e-3 + 1e-9;  // mm
-const std::string kModels = SLABWRIGHT_SOURCE_DIR "/tests/data/";
 
 Job job_for(Post post, LengthUnit units) {
     Job job;

@@ -208,7 +208,7 @@ TEST(RestContours, SemiRoughingTakesWhatStandsOutsideTheSwathAndReachesIt) {
         EXPECT_LE(op.stepdown, semi.stepdown_max + 1e-9);
         // Nothing of the part is entered.
         const double gouge = n.job.tolerances.gouge;
-        const DropIndex part(n.cut.solid, {Cutter::Profile::flat, semi.diameter / 2 - gouge});
+        const DropIndex part(n.cut.solid, flat_cutter(semi.diameter / 2 - gouge));
         for (std::size_t i = 1; i < op.moves.size(); ++i) {
             const Move &a = op.moves[i - 1], &b = op.moves[i];
             if (b.feed == 0) continue;
@@ -272,7 +272,7 @@ TEST(RestContours, ABallsRingsKeepOffTheSurface) {
         EXPECT_EQ(op.spare, allowance);
         // Chords may take a part of the allowance.
         const double kept = 0.3 * allowance;
-        const DropIndex part(n.cut.solid, {Cutter::Profile::ball, ball.diameter / 2 + kept});
+        const DropIndex part(n.cut.solid, ball_cutter(ball.diameter / 2 + kept));
         double lowest = kTop;
         for (std::size_t i = 1; i < op.moves.size(); ++i) {
             const Move &a = op.moves[i - 1], &b = op.moves[i];

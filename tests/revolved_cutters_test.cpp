@@ -155,7 +155,7 @@ TEST(RevolvedCutters, UnderSideAndItsWidthAreInverse) {
 TEST(RevolvedCutters, MeasuresThatMakeNoCutterAreRefused) {
     for (const CutterShape& shape :
          {CutterShape{0, 0, 0}, CutterShape{3, 4, 0}, CutterShape{3, 1, 1.6}, CutterShape{3, -1, 0}})
-        EXPECT_THROW((void)cutter_of(shape), Error);
+        EXPECT_THROW((void)under_side(shape), Error);
 }
 
 TEST(RevolvedCutters, DropsAgreeWithAStackOfDiscs) {
@@ -170,7 +170,7 @@ TEST(RevolvedCutters, DropsAgreeWithAStackOfDiscs) {
         const LayerSolid solid = layer_solid(context, mesh.view(), -20, 30);
         const std::vector<Triangle3> all = triangles_of(solid);
         for (const auto& [name, shape] : shapes_of_all_forms()) {
-            const DropIndex drops(solid, cutter_of(shape));
+            const DropIndex drops(solid, shape);
             const StackOfDiscs judge(shape);
             MetPoints met;
             for (int i = 0; i < poses_of(360); ++i, ++poses) {
@@ -204,7 +204,7 @@ TEST(RevolvedCutters, FibresAgreeWithAStackOfDiscs) {
         const LayerSolid solid = layer_solid(context, mesh.view(), -20, 30);
         const std::vector<Triangle3> all = triangles_of(solid);
         for (const auto& [name, shape] : shapes_of_all_forms()) {
-            const Cutter cutter = cutter_of(shape);
+            const CutterShape& cutter = shape;
             const StackOfDiscs judge(shape);
             for (const Axis axis : {Axis::x, Axis::y}) {
                 const double tip = height(random);
@@ -253,7 +253,7 @@ TEST(RevolvedCutters, ContoursSpareThePart) {
     const Mesh mesh = rough_ground(context, seed);
     const LayerSolid solid = layer_solid(context, mesh.view(), -20, 30);
     const CutterShape shape{3, 1, 0};
-    const Cutter cutter = cutter_of(shape);
+    const CutterShape& cutter = shape;
     const DropIndex drops(solid, cutter);
     constexpr std::int32_t pitch = 2000;
     for (const double tip : {-0.5, 1.2, 3.1, 5.6}) {
@@ -450,7 +450,7 @@ TEST(RevolvedCutters, GougesOfABullNoseAreTheDeepestPoints) {
             const Point3 tip{u(random), u(random), uz(random)};
             double expected = 0;
             for (const Triangle3& t : all) expected = std::max(expected, deepest_of(shape, t, tip));
-            const Penetration found = part.bull_nose(20, tip, tip, shape.radius, shape.corner, 0);
+            const Penetration found = part.depth(shape, 20, tip, tip, 0);
             ASSERT_NEAR(found.found ? found.depth : 0, expected, kMicrometre)
                 << "solid " << solid << ", corner " << shape.corner;
             worst = std::max(worst, std::abs((found.found ? found.depth : 0) - expected));
@@ -465,7 +465,7 @@ TEST(RevolvedCutters, GougesOfABullNoseAreTheDeepestPoints) {
             if (i > 0) m.from = row.back().to;
             if (i % 2 == 0) m.to[2] = m.from[2];
             row.push_back(m);
-            const Penetration found = part.bull_nose(20, m.from, m.to, shape.radius, shape.corner, 0);
+            const Penetration found = part.depth(shape, 20, m.from, m.to, 0);
             double expected = 0;
             for (int k = 0; k <= 60; ++k) {
                 Vec3d tip;
@@ -476,8 +476,7 @@ TEST(RevolvedCutters, GougesOfABullNoseAreTheDeepestPoints) {
             EXPECT_GE(each.back(), expected - kMicrometre) << "solid " << solid << " motion " << i;
             EXPECT_LE(each.back(), expected + 0.15) << "a place between the samples: solid " << solid;
         }
-        const auto found = part.deepest(StandingPart::Form::bull_nose, 20, row, shape.radius, 0, 0.01,
-                                        nullptr, {}, shape.corner);
+        const auto found = part.deepest(shape, 20, row, 0, 0.01);
         EXPECT_NEAR(found.most.found ? found.most.depth : 0, *std::max_element(each.begin(), each.end()),
                     1e-6);
         for (std::size_t i = 0; i < each.size(); ++i)
@@ -508,7 +507,7 @@ TEST(RevolvedCutters, ABullNoseIsNoDeeperThanTheCylinderAroundIt) {
             Point3 to{u(random), u(random), from[2]};
             if (i % 2 == 0) to = {from[0] + 0.1, from[1] + 0.05, from[2]};
             const double top = 5.1371;
-            const Penetration round = part.bull_nose(top, from, to, 4, 1.5, 0),
+            const Penetration round = part.depth({4, 1.5, 0}, top, from, to, 0),
                               sharp = part.cylinder(top, from, to, 4, 0);
             EXPECT_LE(round.found ? round.depth : 0, (sharp.found ? sharp.depth : 0) + 1e-6)
                 << "solid " << solid << " motion " << i;

@@ -109,7 +109,7 @@ struct Roughed {
     // How low the roughing cutter may get over a place at all, with its allowance.
     [[nodiscard]] double least(int i, int j) const {
         const double r = layer.tools.rough.diameter / 2;
-        const DropIndex& part = cut.drops({Cutter::Profile::flat, r + job.cutting.wall_allowance});
+        const DropIndex& part = cut.drops(flat_cutter(r + job.cutting.wall_allowance));
         double lowest = kTop;
         for (double v = -r; v <= r; v += r / 8)
             for (double u = -r; u <= r; u += r / 8)
@@ -224,8 +224,7 @@ TEST(Roughing, FaceMillTakesWhatLiesOpenAndTheEndMillTheRest) {
         EXPECT_LE(both.deepest_cut, std::max(face.stepdown, both.op.stepdown) + 1e-3)
             << "what is left to the end mill is known to it";
         // It keeps farther off than the end mill, and stays out of the pocket.
-        const DropIndex& part =
-            both.cut.drops({Cutter::Profile::flat, r + both.job.cutting.wall_allowance + 0.9});
+        const DropIndex& part = both.cut.drops(flat_cutter(r + both.job.cutting.wall_allowance + 0.9));
         for (std::size_t k = 1; k < face.moves.size(); ++k) {
             const Move &a = face.moves[k - 1], &b = face.moves[k];
             if (b.feed == 0) continue;

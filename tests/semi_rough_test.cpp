@@ -80,8 +80,8 @@ Passed semi_roughed(const Height& height, ToolKind kind, double allowance, const
     Passed passed;
     const double r = tool.diameter / 2;
     std::vector<DropIndex> wider;
-    const Cutter::Profile profile = kind == ToolKind::ball ? Cutter::Profile::ball : Cutter::Profile::flat;
-    for (int k = -2; k <= 10; ++k) wider.emplace_back(w.cut.solid, Cutter{profile, r + 0.01 * k});
+    const auto wide = kind == ToolKind::ball ? ball_cutter : flat_cutter;
+    for (int k = -2; k <= 10; ++k) wider.emplace_back(w.cut.solid, wide(r + 0.01 * k));
     for (std::size_t i = 1; i < op.moves.size(); ++i) {
         const Move &a = op.moves[i - 1], &b = op.moves[i];
         if (b.feed == 0) continue;
@@ -159,7 +159,7 @@ std::size_t could_be_lowered(const Waste& w, const LayerStock& stock, const Tool
                              double worth) {
     const bool ball = tool.kind == ToolKind::ball;
     const double r = tool.diameter / 2;
-    const DropIndex index(w.cut.solid, Cutter{ball ? Cutter::Profile::ball : Cutter::Profile::flat, r});
+    const DropIndex index(w.cut.solid, ball ? ball_cutter(r) : flat_cutter(r));
     const CellGrid& grid = stock.grid();
     constexpr int n = 480;
     std::vector<float> tips;
@@ -238,7 +238,7 @@ TEST(RestMachining, FollowsChannelsAsFarAsTheyAreWideEnough) {
             const std::array<double, 3> from{narrows ? -40 : 0.217, narrows ? 0.68 : -40, z},
                 to{narrows ? 40 : 0.217, narrows ? 0.68 : 40, z};
             stock.cut_along(end, from, to);
-            w.standing.cut({Cutter::Profile::flat, radius}, from, to);
+            w.standing.cut(flat_cutter(radius), from, to);
         }
         const std::size_t before = could_be_lowered(w, stock, tool, limit, worth);
         const Operation op = cut_rest(w.cut, stock, tool, {OperationKind::corner, "rest", limit, false});

@@ -27,6 +27,7 @@
 #include "io/write/sequence_json.h"
 #include "kernels/errors.h"
 #include "tests/support/block_build.h"
+#include "tests/support/every_control.h"
 #include "tests/support/files.h"
 #include "tests/support/rs274.h"
 #include "tests/support/schema.h"
@@ -34,21 +35,11 @@
 #include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
-using slabwright::support::schema_complaint;
-using slabwright::support::slurp;
-using slabwright::support::spit;
-using slabwright::support::TemporaryFolder;
+using namespace slabwright::support;
 
 namespace {
 
-const std::vector<Post> kPosts = [] {
-    std::vector<Post> all;
-    for (const Control& control : kControls) all.push_back(control.post);
-    return all;
-}();
-constexpr LengthUnit kUnits[] = {LengthUnit::mm, LengthUnit::inch};
 constexpr ProgramSpan kSpans[] = {ProgramSpan::operation, ProgramSpan::tool, ProgramSpan::layer};
-const std::string kModels = SLABWRIGHT_SOURCE_DIR "/tests/data/";
 
 bool takes(Post post, ProgramSpan span) { return span != ProgramSpan::layer || changes_tools(post); }
 

@@ -21,23 +21,12 @@
 namespace slabwright {
 namespace {
 
-using support::proof_of;
-using support::texts_of;
-using support::told;
-
-using support::circle;
-using support::loft;
-using support::turned;
+using namespace support;
 
 SheetJob job_of(SheetHead head) {
-    SheetJob job;
-    job.slicing.thicknesses = {6, 12};
-    job.head = head;
-    job.stock = {400, 400};
+    SheetJob job = sheet_job(head, 400);
     job.engraving.depth = 1;
-    job.cutting.kerf = head == SheetHead::router ? 6 : 0.8;
     if (head != SheetHead::router) job.engraving.width = job.cutting.kerf;
-    if (head == SheetHead::jet) job.cutting.most_tilt_deg = 55;
     return job;
 }
 

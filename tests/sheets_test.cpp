@@ -20,26 +20,11 @@
 namespace slabwright {
 namespace {
 
-using support::proof_of;
-using support::texts_of;
-using support::told;
-
-using support::circle;
-using support::loft;
-using support::turned;
+using namespace support;
 
 SheetJob job_of(SheetHead head) {
-    SheetJob job;
-    job.slicing.thicknesses = {6, 12};
-    job.head = head;
-    job.stock = {300, 300};
-    if (head == SheetHead::router) {
-        job.cutting.kerf = 6;
-        job.nesting.spacing = 4;
-    } else {
-        job.cutting.kerf = 0.8;
-    }
-    if (head == SheetHead::jet) job.cutting.most_tilt_deg = 55;
+    SheetJob job = sheet_job(head, 300);
+    if (head == SheetHead::router) job.nesting.spacing = 4;
     return job;
 }
 

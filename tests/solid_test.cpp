@@ -318,13 +318,13 @@ TEST(Cutting, KeepsOutOfWhateverWindsAroundNotZero) {
             for (int i = 0; i < 30; ++i)
                 if (const Point p = within(f, random); p[2] > z_low && p[2] < z_top - 0.002)
                     points.push_back(p);
-        for (const auto profile : {Cutter::Profile::ball, Cutter::Profile::flat}) {
-            const Cutter cutter{profile, 1.5 + 4 * share(random)};
-            const double r = cutter.radius;
+        for (const bool flat : {false, true}) {
+            const double r = 1.5 + 4 * share(random);
+            const CutterShape cutter = flat ? flat_cutter(r) : ball_cutter(r);
             // How deep the point is in the cutter with its tip there, mm.
             const auto depth = [&](const Point& p, double x, double y, double tip) {
                 const double across = std::hypot(p[0] - x, p[1] - y);
-                if (profile == Cutter::Profile::flat) return std::min(r - across, p[2] - tip);
+                if (flat) return std::min(r - across, p[2] - tip);
                 return p[2] >= tip + r ? r - across : r - std::hypot(across, p[2] - tip - r);
             };
             const DropIndex drops(solid, cutter);

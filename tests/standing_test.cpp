@@ -45,7 +45,7 @@ TEST(Standing, IsNeverBelowTheExactStockAnywhere) {
                 if (move % 4 == 1) to[2] = at[2];
                 if (move % 6 == 2) to[0] = at[0], to[1] = at[1];
                 stock.cut({ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, r, 0}, at, to);
-                standing.cut({ball ? Cutter::Profile::ball : Cutter::Profile::flat, r}, at, to);
+                standing.cut(ball ? ball_cutter(r) : flat_cutter(r), at, to);
                 at = to;
             }
         }
@@ -75,10 +75,9 @@ TEST(Standing, StandsAsAfterTheSameWaysInAnyOrder) {
     std::uniform_real_distribution<double> place(-5, 65), step(-9, 9);
     for (int trial = 0; trial < 20; ++trial) {
         const std::array<double, 2> min{0, 0}, max{60, 50};
-        const Cutter flat{Cutter::Profile::flat, trial % 2 == 0 ? 5.0 : 6.35},
-            other{Cutter::Profile::flat, 3};
+        const CutterShape flat = flat_cutter(trial % 2 == 0 ? 5.0 : 6.35), other = flat_cutter(3);
         struct Way {
-            Cutter cutter;
+            CutterShape cutter;
             std::array<double, 3> from, to;
         };
         std::vector<Way> ways;
@@ -104,7 +103,7 @@ TEST(Standing, StandsAsAfterTheSameWaysInAnyOrder) {
 
 TEST(Standing, KnowsWhatWasCleared) {
     Standing standing({0, 0}, {60, 40}, kTop);
-    const Cutter flat{Cutter::Profile::flat, 5};
+    const CutterShape flat = flat_cutter(5);
     EXPECT_NEAR(standing.top(5, {20, 20}, {40, 20}), kTop, 1e-3);
     EXPECT_EQ(standing.top(5, {-20, 20}, {-7, 20}), -std::numeric_limits<double>::infinity());
     for (double y = 0; y <= 40; y += 4) standing.cut(flat, {-6, y, 12}, {30, y, 12});
@@ -121,7 +120,7 @@ TEST(Standing, BallsAreBoundedByTheirShape) {
     // Where a ball went it may go again, lower by nothing and higher by anything; across it meets the cusp
     // between two passes.
     Standing standing({0, 0}, {60, 40}, kTop);
-    const Cutter ball{Cutter::Profile::ball, 3};
+    const CutterShape ball = ball_cutter(3);
     for (double y = 10; y <= 30; y += 0.8)
         for (double x = 5; x < 55; x += 0.4)
             standing.cut(ball, {x, y, 15 + 0.02 * x}, {x + 0.4, y, 15 + 0.02 * (x + 0.4)});

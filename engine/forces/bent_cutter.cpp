@@ -15,8 +15,7 @@ namespace {
 constexpr double kAccuracy = 0.01;  // of coarse classes' peaks, as a share: far finer than the classes are
 
 SegmentForces forces_of(const CutSegment& cut, double accuracy) {
-    return cut.profile == CutterProfile::flat ? closed_form_forces(cut, accuracy)
-                                              : reference_forces(cut, accuracy);
+    return cut.flat() ? closed_form_forces(cut, accuracy) : reference_forces(cut, accuracy);
 }
 
 }  // namespace

@@ -11,11 +11,8 @@ ForceCoefficients coefficients_of(const Material& material, double helix_rad) {
 }
 
 CutSegment idle_cut(const Job& job, const Tool& tool) {
-    CutSegment cut;
-    cut.profile = cutter_profile(cutter_shape(tool));
+    CutSegment cut = segment_of(cutter_shape(tool));
     cut.flutes = tool.flutes;
-    cut.radius_mm = tool.diameter / 2;
-    cut.corner_mm = cutter_shape(tool).form() == CutterForm::bull_nose ? cutter_shape(tool).corner : 0;
     cut.helix_rad = tool.helix_rad;
     cut.coefficients = coefficients_of(job.material, tool.helix_rad);
     cut.spindle_rpm = std::min(tool.max_rpm, job.machine.max_rpm);

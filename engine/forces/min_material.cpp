@@ -23,8 +23,7 @@ constexpr std::size_t kHeights = 128;  // at which sections are taken
 
 OverhangThickness thickness_at(const Job& job, const Tool& tool, double depth, double overhang) {
     const CutSegment cut = hardest_cut(job, tool, depth);
-    const SegmentForces f =
-        cut.profile == CutterProfile::flat ? closed_form_forces(cut) : reference_forces(cut);
+    const SegmentForces f = cut.flat() ? closed_form_forces(cut) : reference_forces(cut);
     OverhangCut slab;
     slab.force_x_n = f.peak_x_n;
     slab.force_y_n = f.peak_y_n;

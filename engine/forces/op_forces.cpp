@@ -36,8 +36,7 @@ CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job&
                     operation.purpose, "give the tool a speed");
     s.chip_load_mm = feed / (operation.spindle_rpm * tool.flutes);
 
-    const double steps = s.profile == CutterProfile::ball ? job.tolerances.rough_cusp : 0,
-                 slot = 2 * s.radius_mm;
+    const double steps = s.ball() ? job.tolerances.rough_cusp : 0, slot = 2 * s.radius_mm;
     double depth = operation.stepdown, width = operation.stepover;
     switch (operation.kind) {
         case OperationKind::rough:

@@ -72,11 +72,11 @@ PathBuilder::PathBuilder(Operation& operation, const Tool& tool, double feed, do
 }
 
 // The middle of a cutter: what stands there is entered head-on. Of a face mill that is nearly all of it.
-Cutter PathBuilder::middle() const {
-    const Cutter& cutter = around_.cutter;
-    if (cutter.profile == Cutter::Profile::ball) return {cutter.profile, kBallMiddle * cutter.radius};
+CutterShape PathBuilder::middle() const {
+    const CutterShape& cutter = around_.cutter;
+    if (cutter.is_ball()) return ball_cutter(kBallMiddle * cutter.radius);
     const bool whole = face_ && !plunges_;
-    return {Cutter::Profile::flat, std::max(core_, whole ? cutter.radius - kRim : kMiddle * cutter.radius)};
+    return flat_cutter(std::max(core_, whole ? cutter.radius - kRim : kMiddle * cutter.radius));
 }
 
 // The steepest slope on which no more stands under the core than its recess, where a point is under it for
@@ -172,9 +172,9 @@ double PathBuilder::standing_middle(Point2 at) {
     learn();
     const std::array<double, 2> p{to_mm(at.x), to_mm(at.y)};
     // Of a flat end every cell counts that its middle may touch; the walls beside the cutter are farther off.
-    const Cutter inner = middle();
-    return inner.profile == Cutter::Profile::flat ? around_.standing->top(inner.radius, p, p)
-                                                  : around_.standing->free_tip(inner, p, p);
+    const CutterShape inner = middle();
+    return inner.is_flat() ? around_.standing->top(inner.radius, p, p)
+                           : around_.standing->free_tip(inner, p, p);
 }
 
 void PathBuilder::go_above(Point2 p) {
@@ -257,7 +257,7 @@ bool PathBuilder::enter(std::span<const PathPoint> run) {
 // on the right of a run that climbs, so the circle's room is looked for on the other side. Whole turns, none
 // steeper than the ramp.
 bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
-    if (around_.part == nullptr || around_.cutter.profile == Cutter::Profile::ball) return false;
+    if (around_.part == nullptr || around_.cutter.is_ball()) return false;
     const PathPoint& first = run.front();
     double ux = 0, uy = 0;
     for (std::size_t k = 1; k < run.size() && ux == 0 && uy == 0; ++k) {

@@ -18,7 +18,7 @@ struct Surroundings {
     Standing* standing = nullptr;  ///< what may stand; the builder cuts its own moves into it
     const DropIndex* part =
         nullptr;  ///< drops of this very cutter, or of a wider one; none: it never stays down
-    Cutter cutter;
+    CutterShape cutter;
     double under =
         0;  ///< mm that the tip of `part`'s cutter lies under this one's where their ends are concentric
     double chord = 0;  ///< mm: longest chord between places where `part` is free that is safe (safe_chord_mm)
@@ -110,7 +110,7 @@ public:
 private:
     void add(std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t feed);
     void learn();
-    [[nodiscard]] Cutter middle() const;
+    [[nodiscard]] CutterShape middle() const;
     [[nodiscard]] double slope_under_core(double way) const;
     [[nodiscard]] double slope_to_and_fro(std::span<const PathPoint> line) const;
     [[nodiscard]] bool comes_down_on_stock(const PathPoint& to);

@@ -42,20 +42,20 @@ GougeReport join(GougeReport a, const GougeReport& b) {
 }
 
 // As StandingPart::deepest() for a cutter with a point. @return the motions beyond the tolerance
-std::vector<std::uint32_t> check_drill(const StandingPart& part, double z_top, const Tool& tool,
-                                       std::span<const StandingPart::Motion> motions,
-                                       std::span<const std::uint32_t> lines, const GougeOptions& options,
-                                       GougePlace& place) {
+std::vector<std::uint32_t> check_pointed(const StandingPart& part, double z_top, const CutterShape& cutter,
+                                         std::span<const StandingPart::Motion> motions,
+                                         std::span<const std::uint32_t> lines, const GougeOptions& options,
+                                         GougePlace& place) {
     std::vector<std::uint32_t> beyond;
     double most = options.ignore;
-    const double radius = tool.diameter / 2, taper = cutter_shape(tool).taper_rad;
     for (std::size_t i = 0; i < motions.size(); ++i) {
         const Point3 &from = motions[i].from, &to = motions[i].to;
         const bool is_upright = from[0] == to[0] && from[1] == to[1];
         const Point3& lower = from[2] < to[2] ? from : to;
         const double at_least = std::min(most, options.tolerance);
-        const Penetration p = is_upright ? part.pointed(z_top, lower, radius, taper, at_least)
-                                         : part.cylinder(z_top, from, to, radius, at_least);
+        const Penetration p = is_upright
+                                  ? part.pointed(z_top, lower, cutter.radius, cutter.taper_rad, at_least)
+                                  : part.cylinder(z_top, from, to, cutter.radius, at_least);
         if (!p.found) continue;
         if (p.depth > options.tolerance) beyond.push_back(static_cast<std::uint32_t>(i));
         if (p.depth > most) {
@@ -64,11 +64,6 @@ std::vector<std::uint32_t> check_drill(const StandingPart& part, double z_top, c
         }
     }
     return beyond;
-}
-
-StandingPart::Form form_of(ToolKind kind) {
-    if (kind == ToolKind::ball) return StandingPart::Form::ball;
-    return kind == ToolKind::bull_nose ? StandingPart::Form::bull_nose : StandingPart::Form::cylinder;
 }
 
 }  // namespace
@@ -85,7 +80,8 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                         const Program& program, const GougeOptions& options) {
     const std::size_t n = program.steps.size();
     if (n < 2) return {};
-    const double radius = tool.diameter / 2, shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
+    const CutterShape cutter = cutter_shape(tool);
+    const double shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
     std::atomic<double> deepest = 0;  // of the whole program, so far
     return parallel_reduce(
         context, n - 1, kTogether, GougeReport{},
@@ -132,19 +128,16 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                     a = b;
                 }
             }
-            auto check = [&](StandingPart::Form form, double thick, GougePlace& place,
-                             std::atomic<double>* known) {
+            auto check = [&](const CutterShape& shape, GougePlace& place, std::atomic<double>* known) {
                 StandingPart::Found found =
-                    part.deepest(form, z_top, motions, thick, options.ignore, options.tolerance, known,
-                                 chords, form == StandingPart::Form::bull_nose ? tool.corner_radius : 0);
+                    part.deepest(shape, z_top, motions, options.ignore, options.tolerance, known, chords);
                 if (found.most.found) place = {found.most.depth, lines[found.motion], found.most.tip};
                 return std::move(found.beyond);
             };
-            const bool ball = tool.kind == ToolKind::ball;
+            const bool ball = cutter.form() == CutterForm::ball;
             const std::vector<std::uint32_t> gouges =
-                tool.kind == ToolKind::drill
-                    ? check_drill(part, z_top, tool, motions, lines, options, r.cutter)
-                    : check(form_of(tool.kind), radius, r.cutter, ball ? &deepest : nullptr);
+                cutter.taper_rad > 0 ? check_pointed(part, z_top, cutter, motions, lines, options, r.cutter)
+                                     : check(cutter, r.cutter, ball ? &deepest : nullptr);
             r.gouges = gouges.size();
             add_lines(r.gouge_lines, lines_of(lines, gouges));
             std::vector<std::uint32_t> touched;
@@ -153,11 +146,11 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                 for (StandingPart::Motion& m : motions)
                     m.from[2] += above - raised, m.to[2] += above - raised;
                 raised = above;
-                const auto beyond = check(StandingPart::Form::cylinder, thick, place, nullptr);
+                const auto beyond = check({thick, 0, 0}, place, nullptr);
                 touched.insert(touched.end(), beyond.begin(), beyond.end());
             };
-            if (shank > radius) follow(r.shank, shank, tool.flute_length);
-            if (nose > radius) follow(r.holder, nose, tool.stickout);
+            if (shank > cutter.radius) follow(r.shank, shank, tool.flute_length);
+            if (nose > cutter.radius) follow(r.holder, nose, tool.stickout);
             std::sort(touched.begin(), touched.end());
             touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
             r.contacts = touched.size();

@@ -31,17 +31,13 @@ struct Taken {
 /// The forces of a cut as deep and as wide as a piece shows it.
 void rate(ReplayPiece& piece, const Tool& tool, const Material& m, double feed, double rpm) {
     if (!(rpm > 0) || !(feed > 0) || !mills(tool.kind)) return;
-    CutSegment s;
-    const double radius = tool.diameter / 2;
-    s.profile = cutter_profile(cutter_shape(tool));
+    CutSegment s = segment_of(cutter_shape(tool));
     s.flutes = tool.flutes;
-    s.radius_mm = radius;
-    s.corner_mm = s.profile == CutterProfile::bull_nose ? cutter_shape(tool).corner : 0;
     s.helix_rad = tool.helix_rad;
     s.coefficients = coefficients_of(m, tool.helix_rad);
     s.spindle_rpm = rpm;
     s.chip_load_mm = feed / (rpm * tool.flutes);
-    s.high_mm = std::min(piece.depth_mm, 64 * radius);
+    s.high_mm = std::min(piece.depth_mm, 64 * s.radius_mm);
     // A ball that cuts less deep than its radius is as wide as its circle at that depth.
     s.arc = engagement_arc(radius_at(s, s.high_mm), piece.width_mm, MillingSense::up);
     const CutForce force = peak_force(s, kForceShare);

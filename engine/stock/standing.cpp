@@ -37,7 +37,7 @@ Standing::Standing(std::array<double, 2> min, std::array<double, 2> max, double 
       ny_(std::max(1, static_cast<int>(std::ceil((max[1] - min[1]) / cell_)))),
       height_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_), static_cast<float>(kRounding)) {}
 
-Standing::HeightTable Standing::made_table(const Cutter& cutter) const {
+Standing::HeightTable Standing::made_table(const CutterShape& cutter) const {
     const double radius = cutter.radius;
     HeightTable table{cutter, 0, std::vector<float>(kTable + 1)};
     const double reach = radius - d_;
@@ -46,14 +46,14 @@ Standing::HeightTable Standing::made_table(const Cutter& cutter) const {
     for (std::size_t k = 0; k <= kTable; ++k) {
         const double rho =
             std::min(radius, std::min(reach, std::sqrt((static_cast<double>(k) + 1) / table.scale)) + d_);
-        table.height[k] = static_cast<float>(cutter.profile == Cutter::Profile::ball
-                                                 ? radius - std::sqrt(radius * radius - rho * rho)
-                                                 : under_side(cutter).height(rho));
+        table.height[k] =
+            static_cast<float>(cutter.is_ball() ? radius - std::sqrt(radius * radius - rho * rho)
+                                                : under_side(cutter).height(rho));
     }
     return table;
 }
 
-const Standing::HeightTable& Standing::table_of(const Cutter& cutter) const {
+const Standing::HeightTable& Standing::table_of(const CutterShape& cutter) const {
     const auto found = std::find_if(tables_.begin(), tables_.end(),
                                     [&](const HeightTable& t) { return t.cutter == cutter; });
     return found != tables_.end() ? *found : tables_.emplace_back(made_table(cutter));
@@ -105,18 +105,18 @@ void Standing::rows_in_both(double radius, const std::array<double, 2>& a, const
     }
 }
 
-void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to,
-                   double core) {
-    if (cutter.profile == Cutter::Profile::other && core > 0) {
+void Standing::cut(const CutterShape& cutter, const std::array<double, 3>& from,
+                   const std::array<double, 3>& to, double core) {
+    if (!cutter.is_plain() && core > 0) {
         // Its floor has the core; the rounding around that takes what it passes over.
         const double floor = under_side(cutter).core;
-        if (floor > d_) cut({Cutter::Profile::flat, floor}, from, to, core);
+        if (floor > d_) cut(flat_cutter(floor), from, to, core);
     }
     const std::array<double, 2> a{from[0], from[1]}, b{to[0], to[1]};
     const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
     const double low = std::min(from[2], to[2]), high = std::max(from[2], to[2]);
     if (low >= top_ || cutter.radius <= d_) return;
-    if (cutter.profile == Cutter::Profile::flat) {
+    if (cutter.is_flat()) {
         // Each covered cell was covered at some place of the way, and no place is higher than its higher end.
         const auto z = static_cast<float>((l2 > 0 ? high : low) - top_ + kRounding);
         const bool level = from[2] == to[2], been = level && from == last_ && cutter.radius == last_radius_;
@@ -176,9 +176,9 @@ double Standing::top(double radius, const std::array<double, 2>& a, const std::a
     return top_ + static_cast<double>(most);
 }
 
-double Standing::free_tip(const Cutter& cutter, const std::array<double, 2>& a,
+double Standing::free_tip(const CutterShape& cutter, const std::array<double, 2>& a,
                           const std::array<double, 2>& b) const {
-    if (cutter.profile == Cutter::Profile::flat) return top(cutter.radius - 2 * d_, a, b);
+    if (cutter.is_flat()) return top(cutter.radius - 2 * d_, a, b);
     const HeightTable& table = table_of(cutter);
     const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
     double most = -std::numeric_limits<double>::infinity();

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "kernels/cutting/cutter.h"
+#include "kernels/cutting/tool_shape.h"
 #include "kernels/geometry/vectors.h"
 
 namespace slabwright {
@@ -30,7 +30,7 @@ public:
     /// The cutter goes straight from `from` to `to`, tips in mm.
     /// @param core radius of a flat cutter's middle that has no edge, mm: what it covers at both ends, and so
     /// all along the way, no edge has passed over
-    void cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to,
+    void cut(const CutterShape& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to,
              double core = 0);
 
     /// Nothing over the disc of `radius` that goes straight from a to b exceeds this; −infinity beside the
@@ -42,7 +42,7 @@ public:
     /// Cells that reach beyond the cutter do not count: within a cell's diagonal of the cutter's rim
     /// something may stand all the same. (Beside a finished wall the cells of the wall itself would forbid
     /// everything.) −infinity beside the stock.
-    [[nodiscard]] double free_tip(const Cutter& cutter, const std::array<double, 2>& a,
+    [[nodiscard]] double free_tip(const CutterShape& cutter, const std::array<double, 2>& a,
                                   const std::array<double, 2>& b) const;
 
     [[nodiscard]] double cell() const { return cell_; }
@@ -55,14 +55,14 @@ private:
     // The under side's height at ρ + d by ρ², of what is no flat; every entry is that of the upper end of its
     // bin.
     struct HeightTable {
-        Cutter cutter;
+        CutterShape cutter;
         double scale = 0;
         std::vector<float> height;
     };
     static double cell_size(std::array<double, 2> min, std::array<double, 2> max);
-    [[nodiscard]] HeightTable made_table(const Cutter& cutter) const;
+    [[nodiscard]] HeightTable made_table(const CutterShape& cutter) const;
     /// The table of this cutter, made when it is first asked for; until the next call.
-    [[nodiscard]] const HeightTable& table_of(const Cutter& cutter) const;
+    [[nodiscard]] const HeightTable& table_of(const CutterShape& cutter) const;
     template <class Spans>
     void each_spans(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, bool been,
                     Spans&& take) const;

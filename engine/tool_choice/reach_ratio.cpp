@@ -8,7 +8,8 @@
 namespace slabwright {
 
 ToolShape shape_of(const Tool& tool) {
-    ToolShape shape = tool_shape(cutter_shape(tool));
+    ToolShape shape;
+    shape.cutter = cutter_shape(tool);
     shape.flute_length = tool.flute_length;
     shape.shank_radius = tool.shank_diameter / 2;
     shape.stickout = tool.stickout;

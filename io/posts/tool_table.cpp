@@ -6,6 +6,7 @@
 
 #include "engine/schedule/probes.h"
 #include "io/posts/gcode_writer.h"
+#include "io/text/job_keys.h"
 #include "io/text/json_text.h"
 
 namespace slabwright {
@@ -26,8 +27,9 @@ std::string tool_table(const Job& job, const std::vector<int>& magazine) {
         text += fmt::format("T{} P{} D", tool->number, pocket);
         append_rounded(text, tool->diameter, 4);
         text += fmt::format(" Z0 ;{}", comment_text(tool->name));
-        if (tool->kind == ToolKind::bull_nose) {
-            text += tool->name.empty() ? "bull-nose R" : ", bull-nose R";
+        if (has_corner(tool->kind)) {
+            if (!tool->name.empty()) text += ", ";
+            text += fmt::format("{} R", word_of(kToolWords, tool->kind));
             append_rounded(text, tool->corner_radius, 4);
         }
         text += '\n';

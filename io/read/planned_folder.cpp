@@ -127,9 +127,8 @@ Tool read_tool(const Field& t) {
     if (t.has("core_diameter")) tool.core_diameter = t["core_diameter"].number();
     if (t.has("ramp_deg")) tool.ramp_deg = t["ramp_deg"].number();
     if (t.has("corner_radius")) tool.corner_radius = t["corner_radius"].number();
-    if (tool.kind == ToolKind::bull_nose &&
-        !(tool.corner_radius > 0 && tool.corner_radius < tool.diameter / 2))
-        t["corner_radius"].fail("is no corner of a bull-nose");
+    if (has_corner(tool.kind) && !(tool.corner_radius > 0 && tool.corner_radius < tool.diameter / 2))
+        t["corner_radius"].fail(fmt::format("is no corner of a {}", word_of(kToolWords, tool.kind)));
     if (tool.core_diameter >= tool.diameter) t["core_diameter"].fail("is no less than the diameter");
     if (tool.ramp_deg > 90) t["ramp_deg"].fail("is no slope");
     return tool;

@@ -57,16 +57,20 @@ std::string text_of(const fs::path& path) {
     return read_whole(path, {ErrorKind::usage, "tools.", kMostToolTableBytes, "check the path of the tools"});
 }
 
-// A row's remark is the tool's name. Of a bull-nose it ends as tool_table() writes it: ", bull-nose R1.5".
+// A row's remark is the tool's name. Of a tool with a corner it ends as tool_table() writes it: ", bull-nose
+// R1.5".
 void add_remark(std::string_view remark, const std::string& place, LibraryTool& tool) {
-    constexpr std::string_view mark = "bull-nose R";
-    const std::size_t at = remark.rfind(mark);
-    double corner = 0;
-    if (at != std::string_view::npos && read_number(remark.substr(at + mark.size()), corner)) {
-        tool.values.emplace_back("kind", std::string("bull-nose"));
+    for (const Word<ToolKind>& kind : kToolWords) {
+        if (!has_corner(kind.value)) continue;
+        const std::string mark = fmt::format("{} R", kind.text);
+        const std::size_t at = remark.rfind(mark);
+        double corner = 0;
+        if (at == std::string_view::npos || !read_number(remark.substr(at + mark.size()), corner)) continue;
+        tool.values.emplace_back("kind", std::string(kind.text));
         tool.values.emplace_back("corner_radius", number_in(remark.substr(at + mark.size()), place));
         remark = trimmed(remark.substr(0, at));
         if (!remark.empty() && remark.back() == ',') remark = trimmed(remark.substr(0, remark.size() - 1));
+        break;
     }
     if (!remark.empty()) tool.values.emplace_back("name", std::string(remark));
 }

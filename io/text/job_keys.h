@@ -143,7 +143,7 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
         "ramp_deg", tool.ramp_deg,
         "degrees, steepest ramp into stock; negative: 10 of a flat or bull-nose, 2 of a face mill, any of "
         "what plunges");
-    if (shows(visit, tool.kind == ToolKind::bull_nose))
+    if (shows(visit, has_corner(tool.kind)))
         visit.key("corner_radius", tool.corner_radius, "mm, of a bull-nose, between its floor and its side");
 }
 

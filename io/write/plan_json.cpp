@@ -75,7 +75,7 @@ void put_tool(JsonText& json, const Plan& plan, const Tool& tool) {
     json.key("kind").string(word_of(kToolWords, tool.kind));
     json.key("name").string(tool.name);
     json.key("diameter").exact(tool.diameter);
-    if (tool.kind == ToolKind::bull_nose) json.key("corner_radius").exact(tool.corner_radius);
+    if (has_corner(tool.kind)) json.key("corner_radius").exact(tool.corner_radius);
     json.key("flute_length").exact(tool.flute_length);
     json.key("shank_diameter").exact(tool.shank_diameter);
     json.key("holder")

@@ -61,13 +61,17 @@ private:
     double ax_, ay_, ux_ = 1, uy_ = 0, length_ = 0;
 };
 
-/// A cutter of one form with a layer's top.
+/// A cutter with a layer's top.
 struct Cutter {
-    StandingPart::Form form;
-    double radius, top;
-    double corner = 0;  ///< of a bull-nose
+    Cutter() = default;
+    Cutter(const CutterShape& shape, double layer_top)
+        : form(shape.form()), radius(shape.radius), corner(shape.corner), top(layer_top) {
+        if (shape.taper_rad > 0) refuse_form(form, "how deep it is in the part");
+    }
+    CutterForm form = CutterForm::flat;
+    double radius = 0, corner = 0, top = 0;
 
-    [[nodiscard]] bool ball() const { return form == StandingPart::Form::ball; }
+    [[nodiscard]] bool ball() const { return form == CutterForm::ball; }
     /// What is asked of a motion is asked of so many pieces of it.
     [[nodiscard]] int pieces(const Point3& from, const Point3& to) const {
         const Point3 span = minus(to, from);
@@ -128,7 +132,7 @@ void meet_bull_nose(const Cutter& cutter, const Piece& piece, const std::array<V
 /// Raises the result by what one facet adds to it on one piece.
 void meet(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& facet, Penetration& result) {
     if (!near(cutter, piece, facet, std::max({facet[0].z, facet[1].z, facet[2].z}), result.depth)) return;
-    if (cutter.form == StandingPart::Form::bull_nose) return meet_bull_nose(cutter, piece, facet, result);
+    if (cutter.form == CutterForm::bull_nose) return meet_bull_nose(cutter, piece, facet, result);
     if (cutter.ball()) {
         Point3 a = piece.a, b = piece.b;
         a[2] += cutter.radius;
@@ -180,24 +184,9 @@ Penetration motion_depth(const Cutter& cutter, const Point3& from, const Point3&
 
 }  // namespace
 
-Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& to, double radius,
-                               double at_least) const {
-    return depth_of(Form::ball, z_top, from, to, radius, at_least);
-}
-
-Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point3& to, double radius,
-                                   double at_least) const {
-    return depth_of(Form::cylinder, z_top, from, to, radius, at_least);
-}
-
-Penetration StandingPart::bull_nose(double z_top, const Point3& from, const Point3& to, double radius,
-                                    double corner, double at_least) const {
-    return depth_of(Form::bull_nose, z_top, from, to, radius, at_least, corner);
-}
-
-Penetration StandingPart::depth_of(Form form, double z_top, const Point3& from, const Point3& to,
-                                   double radius, double at_least, double corner) const {
-    const Cutter cutter{form, radius, z_top - kSheet, corner};
+Penetration StandingPart::depth(const CutterShape& shape, double z_top, const Point3& from, const Point3& to,
+                                double at_least) const {
+    const Cutter cutter(shape, z_top - kSheet);
     return motion_depth(
         cutter, from, to, at_least, [&](const Point3& tip) { return covered(tip[0], tip[1], cutter.top); },
         [&](const Piece& piece, Penetration& result) {
@@ -492,14 +481,13 @@ bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Moti
     return true;
 }
 
-StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<const Motion> motions,
-                                          double radius, double ignore, double tolerance,
-                                          std::atomic<double>* known, std::span<const Chords> chords,
-                                          double corner) const {
+StandingPart::Found StandingPart::deepest(const CutterShape& shape, double z_top,
+                                          std::span<const Motion> motions, double ignore, double tolerance,
+                                          std::atomic<double>* known, std::span<const Chords> chords) const {
     Found found;
     Search search;
-    if (form == Form::ball) search.arcs = chords;
-    const Cutter& cutter = search.cutter = {form, radius, z_top - kSheet, corner};
+    const Cutter& cutter = search.cutter = Cutter(shape, z_top - kSheet);
+    if (cutter.ball()) search.arcs = chords;
     std::vector<unsigned char>& keep = search.keep;
     Stretch stretch, single;
     bool whole = true;  // the stretch's facets are known
@@ -527,7 +515,7 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
             std::max(found.most.depth, known ? known->load(std::memory_order_relaxed) - kEqual : 0.0);
         const double floor = std::max(ignore, std::min(deep, tolerance));
         const auto& [from, to] = motions[m];
-        if (radius <= floor || std::min(from[2], to[2]) >= cutter.top - floor) {
+        if (cutter.radius <= floor || std::min(from[2], to[2]) >= cutter.top - floor) {
             ++m;
             continue;
         }

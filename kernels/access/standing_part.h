@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "kernels/access/near_facets.h"
+#include "kernels/geometry/cutter_shape.h"
 #include "kernels/geometry/vectors.h"
 #include "kernels/mesh/bulk_memory.h"
 #include "kernels/mesh/mesh.h"
@@ -42,24 +43,24 @@ public:
     /// Error of a depth by numerical minimisation, mm.
     static constexpr double kNumericalError = 1e-7;
 
-    /// Largest depth, over a straight motion of the tip, of part in a ball end mill: a ball of `radius` whose
-    /// lowest point is the tip, and the shank of the same radius above its centre. Depth of a point in the
-    /// cutter is its distance from the cutter's surface, so a wall that is cut too deep by d counts d,
-    /// whatever its slope.
+    /// Largest depth of part in a cutter, and its shank of the same radius, over a straight motion of its
+    /// tip. Depth of a point in a cutter is its distance from the cutter's surface, so that a wall that is
+    /// cut too deep by d counts d, whatever its slope; in an upright cylinder, which has no upper end (flat
+    /// end mill, face mill, shank, holder), the lesser of its distances from the wall and from the floor.
     /// @param at_least only depths above this are looked for (0 or more), mm
+    /// @throws Error(usage, "tool.shape") for a cutter with a taper
+    [[nodiscard]] Penetration depth(const CutterShape& cutter, double z_top, const Point3& from,
+                                    const Point3& to, double at_least) const;
+    /// The same for a ball.
     [[nodiscard]] Penetration ball(double z_top, const Point3& from, const Point3& to, double radius,
-                                   double at_least) const;
-
-    /// The same for an upright cylinder that begins at the tip and has no upper end (flat end mill, face
-    /// mill, shank, holder): depth of a point is the lesser of its distances from the wall and from the floor
-    /// of the cylinder.
+                                   double at_least) const {
+        return depth({radius, radius, 0}, z_top, from, to, at_least);
+    }
+    /// The same for a cylinder.
     [[nodiscard]] Penetration cylinder(double z_top, const Point3& from, const Point3& to, double radius,
-                                       double at_least) const;
-
-    /// The same for a bull-nose: an upright cylinder whose floor is rounded off at its rim by `corner`, which
-    /// is more than 0 and less than the radius, mm.
-    [[nodiscard]] Penetration bull_nose(double z_top, const Point3& from, const Point3& to, double radius,
-                                        double corner, double at_least) const;
+                                       double at_least) const {
+        return depth({radius, 0, 0}, z_top, from, to, at_least);
+    }
 
     /// The same for a drill that stands with its point at `tip`: a cone under a cylinder of `radius`. Whoever
     /// went straight down to there was nowhere deeper in the part.
@@ -67,7 +68,6 @@ public:
     [[nodiscard]] Penetration pointed(double z_top, const Point3& tip, double radius, double taper_rad,
                                       double at_least) const;
 
-    enum class Form : char { ball, cylinder, bull_nose };
     struct Motion {
         Point3 from, to;
     };
@@ -93,10 +93,10 @@ public:
     ///        digits with what is known.)
     /// @param chords of the motions that run along circles, in their order: what is found is the same, but
     /// sooner
-    /// @param corner of a bull-nose, mm
-    [[nodiscard]] Found deepest(Form form, double z_top, std::span<const Motion> motions, double radius,
+    /// @throws Error(usage, "tool.shape") for a cutter with a taper
+    [[nodiscard]] Found deepest(const CutterShape& cutter, double z_top, std::span<const Motion> motions,
                                 double ignore, double tolerance, std::atomic<double>* known = nullptr,
-                                std::span<const Chords> chords = {}, double corner = 0) const;
+                                std::span<const Chords> chords = {}) const;
 
     /// Whether there is part just under the plane z at (x, y).
     [[nodiscard]] bool covered(double x, double y, double z) const;
@@ -218,8 +218,6 @@ private:
                   double depth) const;
     bool stretch_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m,
                       double depth) const;
-    [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to,
-                                       double radius, double at_least, double corner = 0) const;
     friend class RisingEnvelope;
     Facets facets_;  ///< in Morton order
     std::vector<BulkVector<Nodes>>

@@ -10,9 +10,9 @@
 #include <span>
 #include <vector>
 
-#include "kernels/cutting/cutter.h"
 #include "kernels/cutting/fibre_facets.h"
 #include "kernels/cutting/forbidden_lines.h"
+#include "kernels/cutting/tool_shape.h"
 
 namespace slabwright {
 
@@ -23,8 +23,8 @@ namespace slabwright {
 template <int U, int V>
 class BlockOfLines : public ForbiddenLines {
 public:
-    BlockOfLines(const LayerSolid& solid, const Cutter& cutter, std::span<const std::int32_t> lines)
-        : ForbiddenLines(cutter.profile == Cutter::Profile::ball, cutter.radius, lines), solid_(solid) {}
+    BlockOfLines(const LayerSolid& solid, const CutterShape& cutter, std::span<const std::int32_t> lines)
+        : ForbiddenLines(cutter.is_ball(), cutter.radius, lines), solid_(solid) {}
 
     // Goes down to a level: what those above it forbid, which are merged(), it forbids too.
     void begin(double zc) {

@@ -199,12 +199,12 @@ void search_other(const LayerSolid& solid, const DropProbe& probe, const Envelop
 }
 
 // The same, and what was met there before spares most of it; `best` begins with what need not be found.
-void search(const LayerSolid& solid, const DropProbe& probe, const Cutter& cutter, double x, double y,
+void search(const LayerSolid& solid, const DropProbe& probe, const CutterShape& cutter, double x, double y,
             double enough, double kept_up, Best& best, MetPoints* met) {
-    if (cutter.profile == Cutter::Profile::other)
+    if (!cutter.is_plain())
         return search_other(solid, probe, under_side(cutter), x, y, enough, kept_up, best, met);
     const double above = best.tip_z, r = cutter.radius;
-    const bool ball = cutter.profile == Cutter::Profile::ball;
+    const bool ball = cutter.is_ball();
     auto found_over = [&](double from) {
         best.tip_z = from;
         if (ball)
@@ -223,8 +223,8 @@ void search(const LayerSolid& solid, const DropProbe& probe, const Cutter& cutte
 
 }  // namespace
 
-double MetPoints::keep_up(const Cutter& cutter, double x, double y) const {
-    if (cutter.profile == Cutter::Profile::other) {
+double MetPoints::keep_up(const CutterShape& cutter, double x, double y) const {
+    if (!cutter.is_plain()) {
         const Envelope under = under_side(cutter);
         double most = -kNoEnd;
         for (const Vec3d& p : points_) {
@@ -238,18 +238,16 @@ double MetPoints::keep_up(const Cutter& cutter, double x, double y) const {
     for (const Vec3d& p : points_) {
         const double dx = x - p[0], dy = y - p[1], room2 = reach * reach - dx * dx - dy * dy;
         if (room2 > 0)
-            most = std::max(
-                most,
-                p[2] + (cutter.profile == Cutter::Profile::ball ? std::sqrt(room2) - cutter.radius : 0));
+            most = std::max(most, p[2] + (cutter.is_ball() ? std::sqrt(room2) - cutter.radius : 0));
     }
     return most - kSurely;
 }
 
-DropIndex::DropIndex(const LayerSolid& solid, const Cutter& cutter) : solid_(solid), cutter_(cutter) {
+DropIndex::DropIndex(const LayerSolid& solid, const CutterShape& cutter) : solid_(solid), cutter_(cutter) {
     if (!(cutter.radius > 0 && cutter.radius <= FacetTree::kWidestCutter))
         throw Error(ErrorKind::usage, "drop.radius", "a cutter's radius is not between 0 and 1 m", "cutter",
                     "correct the tool's diameter");
-    if (cutter.profile == Cutter::Profile::other) (void)under_side(cutter);
+    (void)under_side(cutter);  // refuses measures that make no cutter
     const double unit = solid.tree.unit, r = cutter.radius;
     probe_.radius = static_cast<float>(r / unit);
     probe_.unit = static_cast<float>(unit);
@@ -288,7 +286,7 @@ std::optional<Rest> DropIndex::drop_within(double x, double y, double above, dou
         best.tip_z = above;
         search(solid_, probe_at(x, y), cutter_, x, y, most, kept_up, best, met);
         if (best.tip_z > above) {
-            const bool has_normal = cutter_.profile != Cutter::Profile::flat;
+            const bool has_normal = !cutter_.is_flat();
             rest = {best.tip_z, has_normal ? static_cast<float>(best.x) : 0.0F,
                     has_normal ? static_cast<float>(best.y) : 0.0F, static_cast<float>(best.nz), false};
         }

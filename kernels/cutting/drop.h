@@ -7,8 +7,8 @@
 #include <limits>
 #include <optional>
 
-#include "kernels/cutting/cutter.h"
 #include "kernels/cutting/layer_solid.h"
+#include "kernels/cutting/tool_shape.h"
 
 namespace slabwright {
 
@@ -32,7 +32,7 @@ public:
     }
     /// Less than the tip of this cutter over a place: what the points keep it up to, less what rounding may
     /// take from that; −infinity where none is in reach.
-    [[nodiscard]] double keep_up(const Cutter& cutter, double x, double y) const;
+    [[nodiscard]] double keep_up(const CutterShape& cutter, double x, double y) const;
 
 private:
     static std::array<Vec3d, 8> nowhere() {
@@ -50,7 +50,7 @@ class DropIndex {
 public:
     /// @throws Error(usage, "tool.shape") as under_side(); Error(usage, "drop.radius") for a radius that is
     /// not positive or over FacetTree::kWidestCutter
-    DropIndex(const LayerSolid& solid, const Cutter& cutter);
+    DropIndex(const LayerSolid& solid, const CutterShape& cutter);
     /// Exact over facets, edges and vertices (for a flat cutter over their shadow, tip on the highest of
     /// them). Of contacts that are equally high the one is given that the solid's tree leads to first.
     /// @param above mm: a tip that is no higher need not be told, but may be given as −infinity
@@ -66,13 +66,13 @@ public:
     /// known.
     [[nodiscard]] std::optional<double> tip_within(double x, double y, double most,
                                                    MetPoints* met = nullptr) const;
-    [[nodiscard]] const Cutter& cutter() const { return cutter_; }
+    [[nodiscard]] const CutterShape& cutter() const { return cutter_; }
 
 private:
     [[nodiscard]] bool nothing_near(double x, double y) const;
     [[nodiscard]] DropProbe probe_at(double x, double y) const;
     const LayerSolid& solid_;
-    Cutter cutter_;
+    CutterShape cutter_;
     DropProbe probe_;
 };
 

@@ -185,6 +185,29 @@ FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const
     return tree;
 }
 
+/// Where the probe is as one of the eight boxes sees it, in the tree's units: past each of its sides, from
+/// its middle, and outside of it.
+struct FromBox {
+    float left, right, below, above, mx, my, dx, dy;
+};
+[[gnu::always_inline]] inline FromBox from_box(const FacetTree::Node& node, const DropProbe& probe,
+                                               std::size_t i) {
+    const std::int32_t xl = node.x_low[i], xh = node.x_high[i], yl = node.y_low[i], yh = node.y_high[i];
+    FromBox from{static_cast<float>(xl - probe.x),
+                 static_cast<float>(probe.x - xh),
+                 static_cast<float>(yl - probe.y),
+                 static_cast<float>(probe.y - yh),
+                 static_cast<float>(probe.x - middle(xl, xh)),
+                 static_cast<float>(probe.y - middle(yl, yh)),
+                 0,
+                 0};
+    from.dx = from.left > from.right ? from.left : from.right;
+    from.dy = from.below > from.above ? from.below : from.above;
+    from.dx = (from.dx > kOutside ? from.dx : kOutside) - kOutside;
+    from.dy = (from.dy > kOutside ? from.dy : kOutside) - kOutside;
+    return from;
+}
+
 // Every step is the same for all eight, so that a compiler does them at once. Distances are shortened and
 // heights raised by more than float takes from them.
 SLABWRIGHT_WIDE std::uint32_t ball_bounds(const FacetTree::Node& node, const DropProbe& probe, float least,
@@ -193,14 +216,7 @@ SLABWRIGHT_WIDE std::uint32_t ball_bounds(const FacetTree::Node& node, const Dro
     const float r = probe.radius, r2 = r * r, unit = probe.unit, bend = probe.inverse * unit * unit;
     for (int k = 0; k < FacetTree::kTogether; ++k) {
         const auto i = static_cast<std::size_t>(k);
-        const std::int32_t xl = node.x_low[i], xh = node.x_high[i], yl = node.y_low[i], yh = node.y_high[i];
-        const auto left = static_cast<float>(xl - probe.x), right = static_cast<float>(probe.x - xh),
-                   below = static_cast<float>(yl - probe.y), above = static_cast<float>(probe.y - yh);
-        const auto mx = static_cast<float>(probe.x - middle(xl, xh)),
-                   my = static_cast<float>(probe.y - middle(yl, yh));
-        float dx = left > right ? left : right, dy = below > above ? below : above;
-        dx = (dx > kOutside ? dx : kOutside) - kOutside;
-        dy = (dy > kOutside ? dy : kOutside) - kOutside;
+        const auto [left, right, below, above, mx, my, dx, dy] = from_box(node, probe, i);
         const float room2 = r2 - (dx * dx + dy * dy);
         const float over_box = node.z_max[i] + (std::sqrt(room2 > 0 ? room2 : 0.0F) - r) * unit;
         const float gx = node.gx[i], gy = node.gy[i], w = std::sqrt(1 + gx * gx + gy * gy), px = r * gx / w,
@@ -225,14 +241,8 @@ SLABWRIGHT_WIDE std::uint32_t flat_bounds(const FacetTree::Node& node, const Dro
     const float r = probe.radius, r2 = r * r, unit = probe.unit;
     for (int k = 0; k < FacetTree::kTogether; ++k) {
         const auto i = static_cast<std::size_t>(k);
-        const std::int32_t xl = node.x_low[i], xh = node.x_high[i], yl = node.y_low[i], yh = node.y_high[i];
-        const auto left = static_cast<float>(xl - probe.x), right = static_cast<float>(probe.x - xh),
-                   below = static_cast<float>(yl - probe.y), above = static_cast<float>(probe.y - yh);
-        const auto mx = static_cast<float>(probe.x - middle(xl, xh)),
-                   my = static_cast<float>(probe.y - middle(yl, yh));
-        float dx = left > right ? left : right, dy = below > above ? below : above;
-        dx = (dx > kOutside ? dx : kOutside) - kOutside;
-        dy = (dy > kOutside ? dy : kOutside) - kOutside;
+        const FromBox box = from_box(node, probe, i);
+        const float mx = box.mx, my = box.my, dx = box.dx, dy = box.dy;
         const float gx = node.gx[i], gy = node.gy[i], far = (mx < 0 ? -mx : mx) + (my < 0 ? -my : my);
         const float rim = node.z_mid[i] +
                           (gx * mx + gy * my + r * std::sqrt(gx * gx + gy * gy) + 1e-6F * far) * unit +

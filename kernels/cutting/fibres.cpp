@@ -58,7 +58,7 @@ private:
 template <int V>
 class BlocksOfLevel {
 public:
-    BlocksOfLevel(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter,
+    BlocksOfLevel(Context& context, const LayerSolid& solid, const Loops& inside, const CutterShape& cutter,
                   double zc, std::span<const std::int32_t> lines) {
         const std::size_t blocks = (lines.size() + kBlock - 1) / kBlock;
         list_groups(context, solid, cutter, zc, lines, blocks);
@@ -73,9 +73,9 @@ public:
     }
 
 private:
-    void list_groups(Context& context, const LayerSolid& solid, const Cutter& cutter, double zc,
+    void list_groups(Context& context, const LayerSolid& solid, const CutterShape& cutter, double zc,
                      std::span<const std::int32_t> lines, std::size_t blocks) {
-        const bool ball = cutter.profile == Cutter::Profile::ball;
+        const bool ball = cutter.is_ball();
         const double r = cutter.radius;
         const Among among(lines);
         struct Active {
@@ -146,14 +146,14 @@ Fibres joined(std::span<const Fibres> parts, std::size_t lines) {
 
 template <int U, int V>
 std::vector<Fibres> fibres_along(Context& context, const LayerSolid& solid,
-                                 std::span<const FibreLevel> levels, const Cutter& cutter,
+                                 std::span<const FibreLevel> levels, const CutterShape& cutter,
                                  std::span<const std::int32_t> lines) {
     std::vector<Fibres> result(levels.size());
     if (lines.empty()) return result;
     const std::size_t blocks = (lines.size() + kBlock - 1) / kBlock;
     // The ball's centre, or the disc.
     auto centre = [&](const FibreLevel& level) {
-        return cutter.profile == Cutter::Profile::ball ? level.tip_z + cutter.radius : level.tip_z;
+        return cutter.is_ball() ? level.tip_z + cutter.radius : level.tip_z;
     };
     std::vector<std::size_t> downwards(levels.size());
     std::iota(downwards.begin(), downwards.end(), std::size_t{0});
@@ -187,8 +187,8 @@ std::vector<Fibres> fibres_along(Context& context, const LayerSolid& solid,
 
 }  // namespace
 
-Plane inside_plane(const LayerSolid& solid, const Cutter& cutter, double tip_z) {
-    const double z = cutter.profile == Cutter::Profile::ball ? tip_z + cutter.radius : tip_z;
+Plane inside_plane(const LayerSolid& solid, const CutterShape& cutter, double tip_z) {
+    const double z = cutter.is_ball() ? tip_z + cutter.radius : tip_z;
     // Above the solid's upper end only a ball's cap still matters: over the end's inside it is forbidden as
     // long as it dips below.
     const double end = solid.z_top - kTopSheet;
@@ -197,14 +197,13 @@ Plane inside_plane(const LayerSolid& solid, const Cutter& cutter, double tip_z) 
 }
 
 std::vector<Fibres> fibres(Context& context, const LayerSolid& solid, std::span<const FibreLevel> levels,
-                           const Cutter& cutter, Axis axis, std::span<const std::int32_t> lines) {
-    if (cutter.profile == Cutter::Profile::other)
-        return revolved_fibres(context, solid, levels, cutter, axis, lines);
+                           const CutterShape& cutter, Axis axis, std::span<const std::int32_t> lines) {
+    if (!cutter.is_plain()) return revolved_fibres(context, solid, levels, cutter, axis, lines);
     return axis == Axis::x ? fibres_along<0, 1>(context, solid, levels, cutter, lines)
                            : fibres_along<1, 0>(context, solid, levels, cutter, lines);
 }
 
-Fibres fibres(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter,
+Fibres fibres(Context& context, const LayerSolid& solid, const Loops& inside, const CutterShape& cutter,
               double tip_z, Axis axis, std::span<const std::int32_t> lines) {
     const FibreLevel level{tip_z, &inside};
     return std::move(fibres(context, solid, {&level, 1}, cutter, axis, lines).front());
@@ -224,7 +223,7 @@ Fibres covering(Context& context, std::span<const SolidFacet> facets, double rad
     }
     if (facets.empty()) low = overhang.z_top = 0;
     overhang.groups = facet_groups(context, overhang.facets);
-    return fibres(context, overhang, {}, {Cutter::Profile::flat, radius}, low - 1, axis, lines);
+    return fibres(context, overhang, {}, flat_cutter(radius), low - 1, axis, lines);
 }
 
 std::vector<Stretch> free_stretches(std::span<const Forbidden> forbidden, double low, double high,

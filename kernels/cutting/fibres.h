@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "kernels/cutting/cutter.h"
 #include "kernels/cutting/layer_solid.h"
+#include "kernels/cutting/tool_shape.h"
 #include "kernels/parallel/context.h"
 #include "kernels/slicing/slicing.h"
 
@@ -37,12 +37,12 @@ struct Fibres {
 };
 
 /// The plane whose section is the inside that fibres() asks for at this tip height.
-[[nodiscard]] Plane inside_plane(const LayerSolid& solid, const Cutter& cutter, double tip_z);
+[[nodiscard]] Plane inside_plane(const LayerSolid& solid, const CutterShape& cutter, double tip_z);
 
 /// Fibres along `axis` at the other coordinate's `lines` (units of 0.1 µm, ascending).
 /// @param inside the mesh's section by inside_plane()
 [[nodiscard]] Fibres fibres(Context& context, const LayerSolid& solid, const Loops& inside,
-                            const Cutter& cutter, double tip_z, Axis axis,
+                            const CutterShape& cutter, double tip_z, Axis axis,
                             std::span<const std::int32_t> lines);
 
 /// A height of a cutter's tip, mm, and the mesh's section by inside_plane() there.
@@ -55,8 +55,8 @@ struct FibreLevel {
 /// touches or passes under at every lower one, so each level begins with the next higher one's intervals, and
 /// only what reaches out of them is looked at.
 [[nodiscard]] std::vector<Fibres> fibres(Context& context, const LayerSolid& solid,
-                                         std::span<const FibreLevel> levels, const Cutter& cutter, Axis axis,
-                                         std::span<const std::int32_t> lines);
+                                         std::span<const FibreLevel> levels, const CutterShape& cutter,
+                                         Axis axis, std::span<const std::int32_t> lines);
 
 /// Where a fibre passes within `radius` of the facets, seen from above: the places from which a cutter of
 /// that radius covers some of them. nz is the facets' own.

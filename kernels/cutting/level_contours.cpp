@@ -95,7 +95,7 @@ EdgeCrossing crossing_between(std::span<const Forbidden> intervals, std::int32_t
 
 }  // namespace
 
-FibreGrid fibre_grid(const LayerSolid& solid, const Cutter& cutter, std::int32_t pitch) {
+FibreGrid fibre_grid(const LayerSolid& solid, const CutterShape& cutter, std::int32_t pitch) {
     FibreGrid grid;
     grid.pitch = pitch;
     auto lines = [&](int k) {
@@ -263,7 +263,7 @@ private:
 }  // namespace
 
 std::vector<Contours> level_contours(Context& context, const LayerSolid& solid,
-                                     std::span<const FibreLevel> levels, const Cutter& cutter,
+                                     std::span<const FibreLevel> levels, const CutterShape& cutter,
                                      const FibreGrid& grid) {
     std::vector<Contours> contours(levels.size());
     if (grid.x.size() < 2 || grid.y.size() < 2) return contours;
@@ -276,8 +276,8 @@ std::vector<Contours> level_contours(Context& context, const LayerSolid& solid,
     return contours;
 }
 
-Contours level_contours(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter,
-                        double tip_z, const FibreGrid& grid) {
+Contours level_contours(Context& context, const LayerSolid& solid, const Loops& inside,
+                        const CutterShape& cutter, double tip_z, const FibreGrid& grid) {
     const FibreLevel level{tip_z, &inside};
     return std::move(level_contours(context, solid, {&level, 1}, cutter, grid).front());
 }

@@ -27,7 +27,7 @@ struct FibreGrid {
 
 /// A grid of `pitch` (units), aligned to the origin, that encloses every contour of this cutter around this
 /// solid.
-[[nodiscard]] FibreGrid fibre_grid(const LayerSolid& solid, const Cutter& cutter, std::int32_t pitch);
+[[nodiscard]] FibreGrid fibre_grid(const LayerSolid& solid, const CutterShape& cutter, std::int32_t pitch);
 
 /// The contours at tip height `tip_z`. Every point is the exact end of a fibre's interval, neighbours are at
 /// most √2·pitch apart. A chord of that length between two free positions enters the forbidden region of a
@@ -35,11 +35,11 @@ struct FibreGrid {
 /// the fibres, each point of it lies in a ball (for a flat cutter a disc) of radius r around a point of the
 /// solid, and that ball contains neither end of the chord.
 [[nodiscard]] Contours level_contours(Context& context, const LayerSolid& solid, const Loops& inside,
-                                      const Cutter& cutter, double tip_z, const FibreGrid& grid);
+                                      const CutterShape& cutter, double tip_z, const FibreGrid& grid);
 
 /// The same at several heights, in any order; a result for each.
 [[nodiscard]] std::vector<Contours> level_contours(Context& context, const LayerSolid& solid,
-                                                   std::span<const FibreLevel> levels, const Cutter& cutter,
-                                                   const FibreGrid& grid);
+                                                   std::span<const FibreLevel> levels,
+                                                   const CutterShape& cutter, const FibreGrid& grid);
 
 }  // namespace slabwright

@@ -119,7 +119,7 @@ bool may_touch(double z_min, double z_max, double overhang, double tip_z, double
 }  // namespace
 
 std::vector<Fibres> revolved_fibres(Context& context, const LayerSolid& solid,
-                                    std::span<const FibreLevel> levels, const Cutter& cutter, Axis axis,
+                                    std::span<const FibreLevel> levels, const CutterShape& cutter, Axis axis,
                                     std::span<const std::int32_t> lines) {
     const Envelope under = under_side(cutter);
     const double tall = under.height(under.radius);

@@ -8,9 +8,10 @@
 
 namespace slabwright {
 
-/// As fibres() for Cutter::Profile::other: every facet by itself, many lines in parallel.
+/// As fibres() for a cutter that is neither flat nor a ball: every facet by itself, many lines in parallel.
 [[nodiscard]] std::vector<Fibres> revolved_fibres(Context& context, const LayerSolid& solid,
-                                                  std::span<const FibreLevel> levels, const Cutter& cutter,
-                                                  Axis axis, std::span<const std::int32_t> lines);
+                                                  std::span<const FibreLevel> levels,
+                                                  const CutterShape& cutter, Axis axis,
+                                                  std::span<const std::int32_t> lines);
 
 }  // namespace slabwright

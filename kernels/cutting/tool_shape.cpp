@@ -10,59 +10,16 @@
 
 namespace slabwright {
 
-ToolShape tool_shape(const CutterShape& cutter) {
-    ToolShape tool;
-    tool.radius = cutter.radius;
-    switch (cutter.form()) {
-        case CutterForm::flat:
-            return tool;
-        case CutterForm::ball:
-            tool.profile = ToolShape::Profile::ball;
-            return tool;
-        case CutterForm::bull_nose:
-            tool.profile = ToolShape::Profile::bull_nose;
-            tool.corner_radius = cutter.corner;
-            return tool;
-        case CutterForm::tapered_ball:
-            tool.profile = ToolShape::Profile::tapered_ball;
-            tool.corner_radius = cutter.corner;
-            tool.taper_rad = cutter.taper_rad;
-            return tool;
-        case CutterForm::cone:
-            break;
-    }
-    refuse_form(cutter.form(), "what it reaches");
-}
-
 void check_tool_shape(const ToolShape& tool) {
     auto require = [](bool good, const char* what) {
         if (!good)
             throw Error(ErrorKind::usage, "tool.shape", what, "tool shape", "correct the tool's measures");
     };
-    for (const double length : {tool.radius, tool.corner_radius, tool.taper_rad, tool.flute_length,
-                                tool.shank_radius, tool.stickout, tool.holder_radius})
+    const Envelope under = under_side(tool.cutter);
+    if (tool.cutter.form() == CutterForm::cone) refuse_form(tool.cutter.form(), "what it reaches");
+    for (const double length : {tool.flute_length, tool.shank_radius, tool.stickout, tool.holder_radius})
         require(std::isfinite(length) && length >= 0, "a measure of the tool is negative or not finite");
-    require(tool.radius > 0, "the tool has no radius");
-    double top_of_rounding = 0;
-    switch (tool.profile) {
-        case ToolShape::Profile::flat:
-            break;
-        case ToolShape::Profile::ball:
-            top_of_rounding = tool.radius;
-            break;
-        case ToolShape::Profile::bull_nose:
-            require(tool.corner_radius <= tool.radius, "the corner is larger than the cutter");
-            top_of_rounding = tool.corner_radius;
-            break;
-        case ToolShape::Profile::tapered_ball:
-            require(tool.corner_radius > 0 && tool.corner_radius <= tool.radius,
-                    "the ball at the tip is not smaller than the cutter");
-            require(tool.taper_rad > 0 && tool.taper_rad < std::numbers::pi / 2,
-                    "the taper is not between 0 and 90 degrees");
-            top_of_rounding = tool.corner_radius * (1 - std::sin(tool.taper_rad));
-            break;
-    }
-    require(tool.flute_length == 0 || tool.flute_length >= top_of_rounding,
+    require(tool.flute_length == 0 || tool.flute_length >= under.rounding * (1 - under.sin_taper),
             "the flutes end below the top of the tip's rounding");
 }
 
@@ -134,31 +91,12 @@ Envelope under_side(const CutterShape& cutter) {
 
 std::vector<Envelope> envelopes(const ToolShape& tool) {
     check_tool_shape(tool);
-    Envelope cutter;
-    cutter.radius = tool.radius;
-    switch (tool.profile) {
-        case ToolShape::Profile::flat:
-            cutter.core = tool.radius;
-            break;
-        case ToolShape::Profile::ball:
-            cutter.rounding = tool.radius;
-            break;
-        case ToolShape::Profile::bull_nose:
-            cutter.core = tool.radius - tool.corner_radius;
-            cutter.rounding = tool.corner_radius;
-            break;
-        case ToolShape::Profile::tapered_ball: {
-            cutter.rounding = tool.corner_radius;
-            cutter.sin_taper = std::sin(tool.taper_rad);
-            cutter.cos_taper = std::cos(tool.taper_rad);
-            if (tool.flute_length > 0) {
-                // The flank ends with the flutes, if it is not as wide as the cutter before.
-                const double above = tool.flute_length - cutter.rounding * (1 - cutter.sin_taper);
-                cutter.radius = std::min(cutter.radius, cutter.rounding * cutter.cos_taper +
-                                                            above * cutter.sin_taper / cutter.cos_taper);
-            }
-            break;
-        }
+    Envelope cutter = under_side(tool.cutter);
+    if (cutter.sin_taper > 0 && tool.flute_length > 0) {
+        // The flank ends with the flutes, if it is not as wide as the cutter before.
+        const double above = tool.flute_length - cutter.rounding * (1 - cutter.sin_taper);
+        cutter.radius = std::min(
+            cutter.radius, cutter.rounding * cutter.cos_taper + above * cutter.sin_taper / cutter.cos_taper);
     }
     std::vector<Envelope> parts{cutter};
     auto above = [&](double from, double radius) {

@@ -1,37 +1,23 @@
 // The whole tool as it turns: cutter, shank and holder, for questions of what it reaches.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "kernels/geometry/cutter_shape.h"
 
 namespace slabwright {
 
-/// An end mill about a vertical axis; its position is that of its tip.
+/// A tool about a vertical axis; its position is that of its tip.
 struct ToolShape {
-    enum class Profile : std::uint8_t {
-        flat,         ///< a cylinder with a level floor
-        ball,         ///< half a ball under a cylinder
-        bull_nose,    ///< a cylinder whose floor is rounded off with corner_radius
-        tapered_ball  ///< a ball of corner_radius at the tip under a cone that widens to radius
-    } profile = Profile::flat;
-    double radius = 0;         ///< mm, the cutter's largest
-    double corner_radius = 0;  ///< mm, see the profiles
-    double taper_rad = 0;      ///< between the axis and the flank of a tapered ball
+    CutterShape cutter;
     double flute_length = 0;   ///< mm, from the tip to where the shank begins; 0: the flutes have no end
     double shank_radius = 0;   ///< mm
     double stickout = 0;       ///< mm, from the tip to the holder's nose; 0: there is no holder
     double holder_radius = 0;  ///< mm
 };
 
-/// A cutter alone, without an end, shank or holder.
-/// @throws Error(usage, "tool.shape") for a cone
-[[nodiscard]] ToolShape tool_shape(const CutterShape& cutter);
-
-/// @throws Error(usage, "tool.shape") for a length that is negative or not finite, a radius of 0, a corner
-/// larger than the cutter, a
-///         taper outside (0°, 90°), or flutes that end below the top of the tip's rounding
+/// @throws Error(usage, "tool.shape") for measures that make no cutter, as under_side() has it, a cone, a
+/// length that is negative or not finite, or flutes that end below the top of the tip's rounding
 void check_tool_shape(const ToolShape& tool);
 
 /// The under side of a part of a tool: a level disc of radius `core`, a rounding of radius `rounding`, then

@@ -17,7 +17,7 @@ double sinc(double x) { return std::abs(x) < 1e-4 ? 1 - x * x / 6 : std::sin(x) 
 
 SegmentForces closed_form_forces(const CutSegment& s, double accuracy) {
     forces::check_segment(s, 0);
-    if (s.profile != CutterProfile::flat)
+    if (!s.flat())
         throw Error(ErrorKind::usage, "forces.segment", "a cutter with a rounding has no closed form", {},
                     "use reference_forces");
     const forces::Turn turn = forces::make_turn(s);

@@ -7,33 +7,17 @@
 
 namespace slabwright {
 
-CutterProfile cutter_profile(const CutterShape& shape) {
-    switch (shape.form()) {
-        case CutterForm::flat:
-            return CutterProfile::flat;
-        case CutterForm::ball:
-            return CutterProfile::ball;
-        case CutterForm::bull_nose:
-            return CutterProfile::bull_nose;
-        case CutterForm::tapered_ball:
-        case CutterForm::cone:
-            break;
-    }
-    refuse_form(shape.form(), "the force");
+CutSegment segment_of(const CutterShape& cutter) {
+    if (cutter.taper_rad > 0) refuse_form(cutter.form(), "the force");
+    CutSegment segment;
+    segment.radius_mm = cutter.radius;
+    segment.corner_mm = cutter.corner;
+    return segment;
 }
 
 double radius_at(const CutSegment& s, double height_mm) {
     const double r = s.radius_mm, corner = s.corner_mm;
-    switch (s.profile) {
-        case CutterProfile::flat:
-            break;
-        case CutterProfile::ball:
-            return height_mm < r ? std::sqrt(height_mm * (2 * r - height_mm)) : r;
-        case CutterProfile::bull_nose:
-            if (height_mm < corner) return r - corner + std::sqrt(height_mm * (2 * corner - height_mm));
-            break;
-    }
-    return r;
+    return height_mm < corner ? r - corner + std::sqrt(height_mm * (2 * corner - height_mm)) : r;
 }
 
 ForceCoefficients resolve_coefficients(const OrthogonalForces& k, double helix,
@@ -56,8 +40,8 @@ EngagementArc engagement_arc(double radius, double width, MillingSense sense) {
 }
 
 CutForce peak_force(const CutSegment& segment, double accuracy) {
-    const SegmentForces f = segment.profile == CutterProfile::flat ? closed_form_forces(segment, accuracy)
-                                                                   : reference_forces(segment, accuracy);
+    const SegmentForces f =
+        segment.flat() ? closed_form_forces(segment, accuracy) : reference_forces(segment, accuracy);
     return {f.peak_resultant_n, f.peak_z_n, f.peak_torque_nmm, f.mean_power_w, f.peak_in_plane_n};
 }
 

@@ -32,10 +32,6 @@
 
 namespace slabwright {
 
-enum class CutterProfile : std::uint8_t { flat, ball, bull_nose };
-/// @throws Error(usage, "tool.shape") for a tapered ball or a cone
-[[nodiscard]] CutterProfile cutter_profile(const CutterShape& shape);
-
 /// What a material gives in orthogonal cutting: c, per area of chip, N/mm²; e, per length of edge, N/mm.
 struct OrthogonalForces {
     double ktc = 0, kte = 0, kfc = 0, kfe = 0;
@@ -69,10 +65,9 @@ enum class MillingSense : std::uint8_t { up, down };
 
 /// A piece of a path with one engagement.
 struct CutSegment {
-    CutterProfile profile = CutterProfile::flat;
     int flutes = 2;        ///< 1 … 32
     double radius_mm = 0;  ///< of the cutter
-    double corner_mm = 0;  ///< of a bull-nose, more than 0 and at most its radius
+    double corner_mm = 0;  ///< between its floor and its side: 0 of a flat, of a ball its radius
     double helix_rad = 0;  ///< 0 … 60°
     double low_mm = 0,
            high_mm =
@@ -81,7 +76,14 @@ struct CutSegment {
     double chip_load_mm = 0;  ///< feed per tooth
     double spindle_rpm = 0;   ///< for power; 0: power is 0
     ForceCoefficients coefficients;
+
+    [[nodiscard]] bool flat() const { return corner_mm <= 0; }
+    [[nodiscard]] bool ball() const { return !flat() && corner_mm >= radius_mm; }
 };
+
+/// What a cutter takes before anything is asked of it: its measures alone.
+/// @throws Error(usage, "tool.shape") for a cutter with a taper
+[[nodiscard]] CutSegment segment_of(const CutterShape& cutter);
 
 /// The cutter's radius at a height above its tip, mm: what it cuts across there.
 [[nodiscard]] double radius_at(const CutSegment& segment, double height_mm);

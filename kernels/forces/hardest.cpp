@@ -19,8 +19,7 @@ constexpr double kSecondsFlat = 8e-6, kSecondsBall = 55e-6;
 constexpr double kScreen = 2e-4;
 
 SegmentForces in_double(const CutSegment& cut) {
-    return cut.profile == CutterProfile::flat ? closed_form_forces(cut, kForceAccuracy)
-                                              : reference_forces(cut, kForceAccuracy);
+    return cut.flat() ? closed_form_forces(cut, kForceAccuracy) : reference_forces(cut, kForceAccuracy);
 }
 
 constexpr std::array<double SegmentForces::*, 5> kAsked{
@@ -43,8 +42,8 @@ SolverAhead::~SolverAhead() {
 }
 
 void SolverAhead::expect(std::span<const CutSegment> cuts) {
-    const auto balls = static_cast<std::uint64_t>(std::count_if(
-        cuts.begin(), cuts.end(), [](const CutSegment& cut) { return cut.profile != CutterProfile::flat; }));
+    const auto balls = static_cast<std::uint64_t>(
+        std::count_if(cuts.begin(), cuts.end(), [](const CutSegment& cut) { return !cut.flat(); }));
     const std::lock_guard lock(mutex_);
     balls_ += balls;
     flats_ += cuts.size() - balls;

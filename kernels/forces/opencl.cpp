@@ -80,7 +80,7 @@ std::vector<cl_device_id> all_devices() {
 }
 
 SegmentForces double_forces(const CutSegment& s, double accuracy) {
-    return s.profile == CutterProfile::flat ? closed_form_forces(s, accuracy) : reference_forces(s, accuracy);
+    return s.flat() ? closed_form_forces(s, accuracy) : reference_forces(s, accuracy);
 }
 
 /// A segment as the device takes it; the means, which need no device, go to `means`, so that the turn is cut
@@ -100,14 +100,14 @@ void pack(const CutSegment& s, std::size_t index, double angle, Packed& out, Seg
     out.low = f(t.low);
     out.high = f(t.high);
     out.pitch = f(t.pitch);
-    out.ball = s.profile == CutterProfile::ball ? 1.0f : 0.0f;
+    out.ball = s.ball() ? 1.0f : 0.0f;
     out.tc = f(k.ktc * c);
     out.rc = f(k.krc * c);
     out.ac = f(k.kac * c);
     out.te = f(k.kte);
     out.re = f(k.kre);
     out.ae = f(k.kae);
-    out.pieces = s.profile == CutterProfile::bull_nose ? 0 : t.count;  // the device knows flats and balls
+    out.pieces = s.flat() || s.ball() ? t.count : 0;  // the device knows flats and balls
     out.padding = 0;
     for (int p = 0; p < out.pieces; ++p) {
         const forces::Turn::Piece& piece = t.pieces[static_cast<std::size_t>(p)];
@@ -141,9 +141,9 @@ std::vector<CutSegment> test_cuts(std::size_t n) {
     };
     for (std::size_t i = 0; i < n; ++i) {
         CutSegment& s = cuts[i];
-        s.profile = i % 2 ? CutterProfile::ball : CutterProfile::flat;
         s.flutes = static_cast<int>(1 + i / 2 % 4);
         s.radius_mm = random(1.5, 12.7);
+        s.corner_mm = i % 2 ? s.radius_mm : 0;
         s.helix_rad = i % 8 < 2 ? 0 : random(0, 0.8);
         s.high_mm = random(0.05, 2) * s.radius_mm;
         s.arc = engagement_arc(s.radius_mm, random(0.05, 2.2) * s.radius_mm,
@@ -385,7 +385,7 @@ void ForceSolver::solve(Context& context, std::span<const CutSegment> segments, 
     parallel_for(context, segments.size(), 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             // The device knows flats and balls.
-            if (on_device && segments[i].profile != CutterProfile::bull_nose) continue;
+            if (on_device && (segments[i].flat() || segments[i].ball())) continue;
             forces::check_segment(segments[i], i);
             out[i] = double_forces(segments[i], accuracy);
         }

@@ -24,7 +24,7 @@ void check_segment(const CutSegment& s, std::size_t index) {
     // Written so that NaN fails every test.
     if (s.flutes < 1 || s.flutes > 32) refuse("the number of flutes is not in 1 … 32", index);
     if (!(s.radius_mm > 0 && s.radius_mm <= 1e4)) refuse("the cutter's radius is not positive", index);
-    if (s.profile == CutterProfile::bull_nose && !(s.corner_mm > 0 && s.corner_mm <= s.radius_mm))
+    if (!(s.corner_mm >= 0 && s.corner_mm <= s.radius_mm))
         refuse("the corner is not between 0 and the cutter's radius", index);
     if (!(s.helix_rad >= 0 && s.helix_rad <= std::numbers::pi / 3 + 1e-12))
         refuse("the helix angle is not in 0 … 60°", index);
@@ -54,7 +54,8 @@ Turn make_turn(const CutSegment& s) {
                                t.last};
     std::size_t count = 4;
     // Over its corner an edge stands upright at once.
-    if (s.profile == CutterProfile::bull_nose && t.low < s.corner_mm && s.corner_mm < t.high)
+    const bool has_both = !s.flat() && !s.ball();
+    if (has_both && t.low < s.corner_mm && s.corner_mm < t.high)
         for (const double end : {t.entry, t.exit}) cuts[count++] = end + t.lag_per_mm * s.corner_mm;
     const auto used = std::span(cuts).first(count);
     for (double& cut : used) cut -= t.pitch * std::floor(cut / t.pitch);

@@ -43,8 +43,8 @@ struct Rounding {
     double radius = 0, disc = 0;  ///< mm
 };
 [[nodiscard]] inline Rounding rounding_of(const CutSegment& s) {
-    if (s.profile == CutterProfile::bull_nose) return {true, s.corner_mm, s.radius_mm - s.corner_mm};
-    return {s.profile == CutterProfile::ball, s.radius_mm, 0};
+    if (s.flat()) return {false, s.radius_mm, 0};
+    return {true, s.corner_mm, s.radius_mm - s.corner_mm};
 }
 
 /// @throws Error(usage, "forces.segment") for a segment out of range; `index` names it

@@ -27,8 +27,16 @@ struct CutterShape {
         if (corner <= 0) return CutterForm::flat;
         return corner < radius ? CutterForm::bull_nose : CutterForm::ball;
     }
+    [[nodiscard]] bool is_flat() const { return corner <= 0 && taper_rad <= 0; }
+    [[nodiscard]] bool is_ball() const { return corner > 0 && corner >= radius && taper_rad <= 0; }
+    /// A flat or a ball: facets are met by these many at a time, by others one by one, which takes longer.
+    [[nodiscard]] bool is_plain() const { return is_flat() || is_ball(); }
     friend bool operator==(const CutterShape&, const CutterShape&) = default;
 };
+
+/// A cylinder with a level floor; half a ball under a cylinder.
+[[nodiscard]] constexpr CutterShape flat_cutter(double radius) { return {radius, 0, 0}; }
+[[nodiscard]] constexpr CutterShape ball_cutter(double radius) { return {radius, radius, 0}; }
 
 /// The words for a form, for messages.
 [[nodiscard]] const char* name_of(CutterForm form);

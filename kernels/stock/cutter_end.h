@@ -10,7 +10,7 @@
 namespace slabwright {
 
 /// The lower end of a cutter: height over its tip at radius r is 0 (flat and face), R − √(R² − r²) (ball),
-/// r·slope (drill) or the under side's (bull-nose, tapered ball).
+/// r·slope (a point) or the under side's.
 struct CutterEnd {
     enum class Form : std::uint8_t { flat, ball, cone, other } form = Form::flat;
     double radius = 0;  ///< mm

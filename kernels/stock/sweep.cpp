@@ -11,18 +11,12 @@
 namespace slabwright {
 
 CutterEnd cutter_end(const CutterShape& shape) {
-    switch (shape.form()) {
-        case CutterForm::flat:
-            return {CutterEnd::Form::flat, shape.radius, 0};
-        case CutterForm::ball:
-            return {CutterEnd::Form::ball, shape.radius, 0};
-        case CutterForm::cone:
-            return {CutterEnd::Form::cone, shape.radius, std::tan(std::numbers::pi / 2 - shape.taper_rad)};
-        case CutterForm::bull_nose:
-        case CutterForm::tapered_ball:
-            break;
-    }
-    return {CutterEnd::Form::other, shape.radius, 0, under_side(shape)};
+    const Envelope under = under_side(shape);
+    if (shape.is_flat()) return {CutterEnd::Form::flat, shape.radius, 0};
+    if (shape.is_ball()) return {CutterEnd::Form::ball, shape.radius, 0};
+    if (shape.form() == CutterForm::cone)
+        return {CutterEnd::Form::cone, shape.radius, std::tan(std::numbers::pi / 2 - shape.taper_rad)};
+    return {CutterEnd::Form::other, shape.radius, 0, under};
 }
 
 double least_height(const Envelope& under, double slope, double foot, double aside2, double low,

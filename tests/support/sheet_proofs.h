@@ -11,6 +11,17 @@
 
 namespace slabwright::support {
 
+/// Sheets of 6 and 12 mm from squares of a stock, with the kerf that such a head has; a jet tilts.
+inline SheetJob sheet_job(SheetHead head, double stock_mm) {
+    SheetJob job;
+    job.slicing.thicknesses = {6, 12};
+    job.head = head;
+    job.stock = {stock_mm, stock_mm};
+    job.cutting.kerf = head == SheetHead::router ? 6 : 0.8;
+    if (head == SheetHead::jet) job.cutting.most_tilt_deg = 55;
+    return job;
+}
+
 inline std::vector<std::string> texts_of(const SheetsPlan& plan) {
     std::vector<std::string> texts;
     for (std::size_t i = 0; i < plan.programs.size(); ++i) texts.push_back(sheet_program_text(plan, i));

@@ -31,7 +31,7 @@ Operation face_layer(const LayerCut& cut) {
     const bool beside = cut.low(1, r + 2) <= lo[1] - r;
     Standing standing(lo, hi, cut.stock_top);
     if (!beside) {
-        Surroundings around{&standing, nullptr, {Cutter::Profile::flat, r}};
+        Surroundings around{&standing, nullptr, flat_cutter(r)};
         around.ramp_deg = cut.job.cutting.ramp_deg;
         path.set_surroundings(around);
     }

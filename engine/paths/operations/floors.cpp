@@ -18,7 +18,7 @@ Operation finish_floors(const LayerCut& cut) {
     const Tool& tool = cut.layer.tools.rough;
     Operation op = cut.operation(OperationKind::finish, "floors", tool);
     const double r = tool.diameter / 2;
-    const Cutter cutter{Cutter::Profile::flat, r};
+    const CutterShape cutter = flat_cutter(r);
     const std::vector<double>& heights = cut.floors;
     if (heights.empty()) return op;
     const std::vector<Section> inside = cut.insides(cutter, heights);

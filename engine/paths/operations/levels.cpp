@@ -68,7 +68,7 @@ Operation finish_walls(const LayerCut& cut) {
         z = f;
         if (tips.back() < low) break;
     }
-    const Cutter cutter{Cutter::Profile::flat, r};
+    const CutterShape cutter = flat_cutter(r);
     const std::vector<Contours> contours = cut.contours(cutter, tips, safe_pitch(r, gouge));
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
                      cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
@@ -218,7 +218,7 @@ public:
           tool_(cut.layer.tools.finish),
           r_(tool_.diameter / 2),
           slopes_(finish_slopes(cut.job.cutting)),
-          cutter_{Cutter::Profile::ball, r_},
+          cutter_(ball_cutter(r_)),
           op_(cut.operation(OperationKind::finish, "level contours", tool_)) {}
 
     Operation run(std::vector<Diagnostic>& diagnostics) {
@@ -227,7 +227,7 @@ public:
         const FibreGrid grid = fibre_grid(cut_.solid, cutter_, safe_pitch(r_, cut_.job.tolerances.gouge));
         const std::vector<Contours> contours = cut_.contours(cutter_, tips_, grid.pitch);
         // A vertical wall belongs to the flat end mill wherever that can stand against the place of contact.
-        const DropIndex flat(cut_.solid, Cutter{Cutter::Profile::flat, flat_r_ - kNarrower});
+        const DropIndex flat(cut_.solid, flat_cutter(flat_r_ - kNarrower));
         const DropIndex& part = cut_.drops(cutter_);
         // So high a wall of the least slope that is called vertical leans out by as much as `flat` is
         // narrower.
@@ -390,7 +390,7 @@ private:
     const Tool& tool_;
     const double r_;
     const FinishSlopes slopes_;
-    const Cutter cutter_;
+    const CutterShape cutter_;
     Operation op_;
     const double vertical_ = vertical_nz(cut_), flat_r_ = cut_.layer.tools.rough.diameter / 2;
     bool any_vertical_ = false;  // else nothing goes along walls before, and edges are all that is as steep

@@ -90,8 +90,8 @@ public:
         if (chosen.empty()) return op_;
         choose_step(diagnostics);
         const std::vector<Loops> curves = curves_in(chosen);
-        const DropIndex ball(cut_.solid, {Cutter::Profile::ball, r_});
-        const DropIndex flat(cut_.solid, {Cutter::Profile::flat, cut_.layer.tools.rough.diameter / 2 - 0.02});
+        const DropIndex ball(cut_.solid, ball_cutter(r_));
+        const DropIndex flat(cut_.solid, flat_cutter(cut_.layer.tools.rough.diameter / 2 - 0.02));
         ball_ = &ball, flat_ = &flat;
         const Slide slide{&ball, true, chord_, cut_.layer.z_top, 3};
         std::vector<std::vector<std::vector<PathPoint>>> runs(curves.size());

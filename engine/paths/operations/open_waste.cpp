@@ -122,8 +122,7 @@ Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<Open
                            EngagedStock* stock) {
     Operation op;
     const bool in_spindle = to_units(cut.stock_top - cut.layer.z_top) > 0;
-    const DropIndex part(cut.solid,
-                         {Cutter::Profile::flat, face.diameter / 2 + kept_off_walls(cut.job.cutting)});
+    const DropIndex part(cut.solid, flat_cutter(face.diameter / 2 + kept_off_walls(cut.job.cutting)));
     const Standing stood = *cut.standing;
     const std::size_t no_ways = cut.no_way_in.size();
     for (;;) {

@@ -83,7 +83,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     Operation op = cut.operation(OperationKind::finish, "projected raster", tool);
     const RasterFacets facets = raster_facets(cut);
     if (facets.shallow.empty()) return op;
-    const DropIndex& ball = cut.drops({Cutter::Profile::ball, facets.radius});
+    const DropIndex& ball = cut.drops(ball_cutter(facets.radius));
     const RasterLines raster = chosen_lines(cut, facets, ball);
     op.stepover = raster.widest_mm;
     if (raster.kept_wide)

@@ -47,8 +47,7 @@ public:
                 const double wide =
                     flat.drops->cutter().radius + 0.5 * to_mm((kTogether[w] - 1) * step_) + kRounding;
                 if (wide <= FacetTree::kWidestCutter)
-                    mill.wide[w] =
-                        std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, wide});
+                    mill.wide[w] = std::make_unique<DropIndex>(cut.solid, flat_cutter(wide));
             }
         }
     }
@@ -103,8 +102,7 @@ public:
 private:
     void add(const LayerCut& cut, const Tool& tool) {
         const double radius = tool.diameter / 2;
-        flats_.push_back(
-            {radius, std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, radius - 0.02})});
+        flats_.push_back({radius, std::make_unique<DropIndex>(cut.solid, flat_cutter(radius - 0.02))});
     }
 
     struct Flat {

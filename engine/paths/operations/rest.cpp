@@ -44,7 +44,7 @@ public:
         op.spare = pass_.allowance;
         if (targets_.count() == 0) return op;
         find_room();
-        index_ = &cut_.drops({ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, wide_});
+        index_ = &cut_.drops(ball_ ? ball_cutter(wide_) : flat_cutter(wide_));
         {
             LayerStock::Trial places(stock_);  // the stock stands as before when its lines are known
             lay_lines();

@@ -31,12 +31,11 @@ RestPlaces::RestPlaces(const LayerCut& cut, LayerStock& stock, const Tool& tool,
       wide_(r_ + pass.allowance),
       under_(ball_ ? pass.allowance : 0),
       end_(cutter_end(tool)),
-      targets_(
-          cut.context, stock, pass, finish_slopes(cut.job.cutting).levels_from,
-          (!pass.in_steps || pass.skin > 0)
-              ? &cut.drops({Cutter::Profile::flat, pass.in_steps ? std::min(pass.limit, r_ / 2) : pass.limit})
-              : nullptr,
-          r_),
+      targets_(cut.context, stock, pass, finish_slopes(cut.job.cutting).levels_from,
+               (!pass.in_steps || pass.skin > 0)
+                   ? &cut.drops(flat_cutter(pass.in_steps ? std::min(pass.limit, r_ / 2) : pass.limit))
+                   : nullptr,
+               r_),
       tolerance_(std::max(cut.job.tolerances.gouge, pass.allowance)),
       chord_(safe_chord_mm(wide_, tolerance_)),
       step_(safe_step(wide_, tolerance_)),

@@ -37,7 +37,7 @@ constexpr double kMoreThanStep =
 // Whether a flat end mill comes down to a floor anywhere, by places a third of its radius apart.
 bool stands_on(const LayerCut& cut, const Tool& tool, double floor) {
     const double r = tool.diameter / 2, step = r / 3;
-    const DropIndex& part = cut.drops({Cutter::Profile::flat, r});
+    const DropIndex& part = cut.drops(flat_cutter(r));
     for (const SolidFacet& f : floor_facets(cut, floor)) {
         const auto [x0, x1] = std::minmax({f.p[0][0], f.p[1][0], f.p[2][0]});
         const auto [y0, y1] = std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]});
@@ -163,7 +163,7 @@ public:
           tool_(cut.layer.tools.rough),
           contour_(cut.job.cutting.rough_pattern == RoughPattern::contour),
           r_(tool_.diameter / 2),
-          cutter_{Cutter::Profile::flat, r_ + kept_off_walls(cut.job.cutting)},
+          cutter_(flat_cutter(r_ + kept_off_walls(cut.job.cutting))),
           op_(cut.operation(OperationKind::rough, contour_ ? "contour-parallel levels" : "zigzag levels",
                             tool_)),
           steps_(contour_ ? terraced_steps(cut, tool_, cut.job.cutting.floor_allowance)
@@ -365,7 +365,7 @@ private:
     const Tool& tool_;
     const bool contour_;
     const double r_;
-    const Cutter cutter_;
+    const CutterShape cutter_;
     Operation op_;
     const std::vector<RoughStep> steps_;
     const std::size_t last_;  // cuts the slab through

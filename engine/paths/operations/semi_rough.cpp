@@ -72,7 +72,7 @@ public:
     LevelTargets(Context& context, const LayerStock& stock, double limit, const Tool& tool)
         : stock_(stock),
           limit_(limit),
-          radius_(tool.diameter / 2 - tool.corner_radius),  // a bull-nose meets with its floor
+          radius_(clearing_radius(tool)),
           ball_(tool.kind == ToolKind::ball),
           reach_(1 + (static_cast<int>(radius_ / stock.grid().cell) + 1) / kTile),
           tiles_x_((stock.grid().nx + kTile - 1) / kTile),
@@ -325,7 +325,7 @@ public:
         for (const Level& l : levels) tips.push_back(l.tip);
         const auto tip_over = [&](double z) { return z - stock_.z_bottom(); };
         if (pass_.swath > 0)
-            targets.leave_walls(cut_.context, cut_.drops({Cutter::Profile::flat, pass_.swath}),
+            targets.leave_walls(cut_.context, cut_.drops(flat_cutter(pass_.swath)),
                                 tip_over(*std::min_element(tips.begin(), tips.end())), cut_.floors);
         // What no level has now none will have.
         std::vector<char> wanted(tips.size());
@@ -344,7 +344,7 @@ public:
         std::vector<std::optional<Contours>> borders(tips.size());
         const Tool& rough = cut_.layer.tools.rough;
         const std::array<std::pair<const DropIndex*, double>, 1> wider{
-            std::pair{&cut_.drops({Cutter::Profile::flat, rough.diameter / 2}), rough.diameter / 2}};
+            std::pair{&cut_.drops(flat_cutter(rough.diameter / 2)), rough.diameter / 2}};
         std::vector<std::vector<LevelRun>> runs;
         double above = cut_.layer.z_top;
         for (std::size_t i = 0; i < tips.size(); ++i) {
@@ -411,8 +411,8 @@ private:
         return levels;
     }
 
-    [[nodiscard]] Cutter wider_by(double allowance) const {
-        return {ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, r_ + allowance};
+    [[nodiscard]] CutterShape wider_by(double allowance) const {
+        return ball_ ? ball_cutter(r_ + allowance) : flat_cutter(r_ + allowance);
     }
     [[nodiscard]] FibreGrid grid_of(double allowance) const {
         const double gouge = cut_.job.tolerances.gouge;
@@ -426,7 +426,7 @@ private:
                       std::span<const char> wanted, const FibreGrid& grid,
                       std::vector<std::optional<Contours>>& borders) const {
         const double allowance = allowances[first];
-        const Cutter cutter = wider_by(allowance);
+        const CutterShape cutter = wider_by(allowance);
         std::vector<std::size_t> which;
         std::vector<double> at;  // of the wider cutter's tip
         for (std::size_t i = first; i < tips.size(); ++i) {
@@ -549,9 +549,9 @@ private:
         }
     }
 
-    // mm between rings; those of a bull-nose must not leave ridges between their floors.
+    // mm between rings; floors must not leave ridges between them.
     [[nodiscard]] double step() const {
-        return std::min(kStepShare * tool_.diameter, tool_.diameter - 2 * tool_.corner_radius);
+        return std::min(kStepShare * tool_.diameter, 2 * clearing_radius(tool_));
     }
 
     // mm/min: the first cut through a place is as wide as the cutter.
@@ -563,8 +563,7 @@ private:
     void emit(Operation& op, std::vector<std::vector<LevelRun>>& runs) const {
         PathBuilder path(op, tool_, feed(), cut_.layer.z_top + cut_.job.machine.clearance,
                          cut_.layer.z_top + 2);
-        const DropIndex& part = cut_.drops(ball_ ? Cutter{Cutter::Profile::ball, r_ + pass_.allowance}
-                                                 : Cutter{Cutter::Profile::flat, r_});
+        const DropIndex& part = cut_.drops(ball_ ? ball_cutter(r_ + pass_.allowance) : flat_cutter(r_));
         path.set_surroundings(cut_.around(tool_, &part));
         cut_levels(path, cut_, tool_, part, runs, false);
         path.finish();

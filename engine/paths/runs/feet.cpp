@@ -118,7 +118,7 @@ std::vector<std::int32_t> lines_between(const std::vector<std::int32_t>& lines, 
 }  // namespace
 
 std::vector<Contours> contours_near(Context& context, const LayerSolid& around, std::span<const double> tips,
-                                    std::span<const Section> inside, const Cutter& cutter,
+                                    std::span<const Section> inside, const CutterShape& cutter,
                                     const FibreGrid& grid) {
     if (around.groups.empty()) return std::vector<Contours>(tips.size());
     const Occupied occupied(around.groups);
@@ -152,7 +152,7 @@ void append_foot_runs(const LayerCut& cut, const Tool& tool, double floor, const
     if (heights.empty()) return;
     const double r = tool.diameter / 2, wall_nz = std::cos(cut.job.cutting.vertical_deg * kDegree),
                  foot_nz = std::cos(kSteepFoot);
-    const Cutter cutter{Cutter::Profile::flat, r};
+    const CutterShape cutter = flat_cutter(r);
     const std::vector<SolidFacet> facets = floor_facets(cut, floor);
     const NearFloor near(cut, facets, r, grid);
     const LayerSolid around = solid_near(cut.context, cut.solid, facets, 2 * (r + to_mm(grid.pitch)));

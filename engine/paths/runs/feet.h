@@ -32,7 +32,7 @@ private:
 /// @param inside  the sections for the tips  @param grid  of the whole solid
 [[nodiscard]] std::vector<Contours> contours_near(Context& context, const LayerSolid& around,
                                                   std::span<const double> tips,
-                                                  std::span<const Section> inside, const Cutter& cutter,
+                                                  std::span<const Section> inside, const CutterShape& cutter,
                                                   const FibreGrid& grid);
 
 /// Heights over a floor, descending, at which a flat end mill goes around the steep walls that stand on it:

@@ -29,13 +29,13 @@ Loops LayerCut::stock_outline() const {
     return stock;
 }
 
-std::vector<Section> LayerCut::insides(const Cutter& cutter, std::span<const double> tip_z) const {
+std::vector<Section> LayerCut::insides(const CutterShape& cutter, std::span<const double> tip_z) const {
     std::vector<Plane> planes;
     for (const double z : tip_z) planes.push_back(inside_plane(solid, cutter, z));
     return slice(context, layer.mesh, planes, {job.tolerances.gap});
 }
 
-std::vector<Contours> LayerCut::contours(const Cutter& cutter, std::span<const double> tip_z,
+std::vector<Contours> LayerCut::contours(const CutterShape& cutter, std::span<const double> tip_z,
                                          std::int32_t pitch) const {
     const std::vector<Section> inside = insides(cutter, tip_z);
     std::vector<FibreLevel> levels;
@@ -43,7 +43,7 @@ std::vector<Contours> LayerCut::contours(const Cutter& cutter, std::span<const d
     return level_contours(context, solid, levels, cutter, fibre_grid(solid, cutter, pitch));
 }
 
-const DropIndex& LayerCut::drops(const Cutter& cutter) const {
+const DropIndex& LayerCut::drops(const CutterShape& cutter) const {
     for (const auto& [of, index] : made_drops)
         if (of == cutter) return *index;
     made_drops.emplace_back(cutter, std::make_unique<DropIndex>(solid, cutter));
@@ -51,12 +51,12 @@ const DropIndex& LayerCut::drops(const Cutter& cutter) const {
 }
 
 Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
-    const Cutter cutter = cutter_of(cutter_shape(tool));
+    const CutterShape cutter = cutter_shape(tool);
     Surroundings around{standing, part, cutter};
     // Where the places are those of a wider cutter, half of what it is wider by may go.
     const double wider = part != nullptr ? part->cutter().radius - cutter.radius : 0;
     around.chord = safe_chord_mm(cutter.radius, std::max(job.tolerances.gouge, wider / 2));
-    around.under = cutter.profile == Cutter::Profile::ball ? wider : 0;
+    around.under = cutter.is_ball() ? wider : 0;
     around.ramp_deg = job.cutting.ramp_deg;
     around.no_way_in = &no_way_in;
     around.lowest_rapid = layer.z_bottom + PathBuilder::kStop;

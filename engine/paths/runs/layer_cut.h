@@ -34,9 +34,10 @@ struct LayerCut {
         return alpha.least(z0, z1, at_least);
     }
     /// Sections of the mesh for the tip heights of a cutter, in their order.
-    [[nodiscard]] std::vector<Section> insides(const Cutter& cutter, std::span<const double> tip_z) const;
+    [[nodiscard]] std::vector<Section> insides(const CutterShape& cutter,
+                                               std::span<const double> tip_z) const;
     /// The contour of every level, levels in parallel.
-    [[nodiscard]] std::vector<Contours> contours(const Cutter& cutter, std::span<const double> tip_z,
+    [[nodiscard]] std::vector<Contours> contours(const CutterShape& cutter, std::span<const double> tip_z,
                                                  std::int32_t pitch) const;
     [[nodiscard]] Operation operation(OperationKind kind, const char* purpose, const Tool& tool) const;
 
@@ -46,11 +47,11 @@ struct LayerCut {
     AlphaMap alpha;  ///< from floor_below to the layer's top
 
     /// Drops of a cutter; made at the first call and kept. Call it from the layer's own thread only.
-    [[nodiscard]] const DropIndex& drops(const Cutter& cutter) const;
+    [[nodiscard]] const DropIndex& drops(const CutterShape& cutter) const;
     /// What a tool's links must know; `part` as for Surroundings.
     [[nodiscard]] Surroundings around(const Tool& tool, const DropIndex* part) const;
     Standing* standing = nullptr;  ///< what stands after the operations so far; null: not known
-    mutable std::vector<std::pair<Cutter, std::unique_ptr<DropIndex>>> made_drops{};
+    mutable std::vector<std::pair<CutterShape, std::unique_ptr<DropIndex>>> made_drops{};
     mutable std::vector<std::array<double, 3>> no_way_in{};  ///< where runs were left out (Surroundings)
 };
 

@@ -860,13 +860,12 @@ function cutterMeshes(tool) {
         return mesh;
     };
     const r = tool.diameter / 2, flute = tool.flute_length, shank = tool.shank_diameter / 2, stick = tool.holder.stickout, nose = tool.holder.diameter / 2, end = [];
-    if (tool.kind === 'ball') for (let k = 0; k <= 10; ++k) end.push([r * Math.sin(k * Math.PI / 20), r * (1 - Math.cos(k * Math.PI / 20))]);
-    else if (tool.kind === 'bull-nose') {
-        const c = tool.corner_radius;
+    if (tool.kind === 'drill') end.push([0, 0], [r, r * Math.tan(31 * Math.PI / 180)]);
+    else {
+        const corner = tool.kind === 'ball' ? r : tool.corner_radius || 0;
         end.push([0, 0]);
-        for (let k = 0; k <= 10; ++k) end.push([r - c + c * Math.sin(k * Math.PI / 20), c * (1 - Math.cos(k * Math.PI / 20))]);
-    } else if (tool.kind === 'drill') end.push([0, 0], [r, r * Math.tan(31 * Math.PI / 180)]);
-    else end.push([0, 0], [r, 0]);
+        for (let k = 0; k <= 10; ++k) end.push([r - corner + corner * Math.sin(k * Math.PI / 20), corner * (1 - Math.cos(k * Math.PI / 20))]);
+    }
     const meshes = [turned([...end, [r, flute], [0, flute]], edge), turned([[0, flute], [shank, flute], [shank, Math.max(flute, stick)], [0, Math.max(flute, stick)]], steel)];
     meshes.push(turned([[0, stick], [nose, stick], [nose, stick + 25], [0, stick + 25]], holder));
     return meshes;
