@@ -305,16 +305,22 @@ TEST(StandingPart, ShortMotionsAfterOneInsideThePartAreFound) {
     EXPECT_GT(deep, 1000U);
 }
 
+/// Bumps, and draws of ways over them.
+class BumpyPart : public testing::Test {
+protected:
+    double unit() { return std::uniform_real_distribution<double>(0, 1)(random); }
+    double between(double low, double high) { return low + (high - low) * unit(); }
+
+    Context context;
+    const Mesh mesh = relief(24, bumpy);
+    const StandingPart part{context, mesh.view()};
+    const unsigned seed = test::seed();
+    std::mt19937 random{seed};
+};
+
 // Rows as programs have them: arcs of short chords, rings and zigzags of long motions, far from the part,
 // beside it and just within it.
-TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
-    Context context;
-    const Mesh m = relief(24, bumpy);
-    const StandingPart part(context, m.view());
-    const unsigned seed = test::seed();
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> unit(0, 1);
-    auto between = [&](double low, double high) { return low + (high - low) * unit(random); };
+TEST_F(BumpyPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
     std::size_t just = 0, free = 0, deep = 0;
     for (int trial = 0; trial < 100; ++trial) {
         const double z_top = trial % 4 == 0 ? 6.5 : 100.0, radius = between(0.4, 4);
@@ -328,9 +334,9 @@ TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
         const double climb = trial % 3 == 0 ? between(-0.01, 0.01) : 0,
                      stair = trial % 3 == 1 ? between(0, 0.6) : 0;
         while (motions.size() < 300) {
-            const double kind = unit(random);
+            const double kind = unit();
             if (kind < 0.6) {  // an arc
-                const double bend = std::pow(10, between(0, 1.7)) * (unit(random) < 0.5 ? -1 : 1),
+                const double bend = std::pow(10, between(0, 1.7)) * (unit() < 0.5 ? -1 : 1),
                              chord = between(0.05, 0.4);
                 double heading = between(0, 6.3);
                 for (int n = static_cast<int>(between(5, 120)); n > 0; --n, heading += chord / bend)
@@ -456,14 +462,7 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
 
 // Chords of circles, of which it is told that they are: what is found is the same, down to the last digit but
 // for the top sheet, under which many motions are as deep as one another.
-TEST(StandingPart, ChordsOfCirclesAgreeWithSingleQuestions) {
-    Context context;
-    const Mesh m = relief(24, bumpy);
-    const StandingPart part(context, m.view());
-    const unsigned seed = test::seed();
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> unit(0, 1);
-    auto between = [&](double low, double high) { return low + (high - low) * unit(random); };
+TEST_F(BumpyPart, ChordsOfCirclesAgreeWithSingleQuestions) {
     std::size_t just = 0, deep = 0, shallow = 0;
     for (int trial = 0; trial < 300; ++trial) {
         const double z_top = trial % 4 == 0 ? 6.5 : 100.0, R = between(0.4, 4);
@@ -472,16 +471,16 @@ TEST(StandingPart, ChordsOfCirclesAgreeWithSingleQuestions) {
         Point3 at{between(-3, 27), between(-3, 27), between(3, 9)};
         for (int arc = 0; arc < 6; ++arc) {
             // Sometimes a line first; then an arc whose chords miss it by up to some micrometres.
-            if (unit(random) < 0.5) {
+            if (unit() < 0.5) {
                 const Point3 to{at[0] + between(-2, 2), at[1] + between(-2, 2),
-                                unit(random) < 0.5 ? at[2] : between(3, 9)};
+                                unit() < 0.5 ? at[2] : between(3, 9)};
                 motions.push_back({at, to});
                 at = to;
             }
             const double radius = std::pow(10, between(-1, 2)), start = between(-4, 4),
                          step = 2 * std::sqrt(2 * 0.0005 / radius);
             const double x = at[0] - radius * std::cos(start), y = at[1] - radius * std::sin(start),
-                         way = unit(random) < 0.5 ? -step : step;
+                         way = unit() < 0.5 ? -step : step;
             const std::size_t first = motions.size(),
                               count = static_cast<std::size_t>(between(1, std::min(60.0, 6.2 / step)));
             for (std::size_t i = 1; i <= count; ++i) {

@@ -185,6 +185,8 @@ FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const
     return tree;
 }
 
+namespace {
+
 /// Where the probe is as one of the eight boxes sees it, in the tree's units: past each of its sides, from
 /// its middle, and outside of it.
 struct FromBox {
@@ -207,6 +209,8 @@ struct FromBox {
     from.dy = (from.dy > kOutside ? from.dy : kOutside) - kOutside;
     return from;
 }
+
+}  // namespace
 
 // Every step is the same for all eight, so that a compiler does them at once. Distances are shortened and
 // heights raised by more than float takes from them.
