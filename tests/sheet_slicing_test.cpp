@@ -357,7 +357,11 @@ TEST(BorderDistance, IsThatOfTheNearestEdge) {
                     nearest = std::min(nearest, std::hypot(p.x - a.x - t * dx, p.y - a.y - t * dy));
                 }
             }
-            ASSERT_NEAR(distance(p), nearest / kUnitsPerMm, 1e-9);
+            nearest /= kUnitsPerMm;
+            ASSERT_NEAR(distance(p), nearest, 1e-9);
+            const double most = 2 * nearest * double(random()) / 4294967296.0;
+            const double within = distance.nearest_within(p, most).distance;
+            ASSERT_TRUE(nearest <= most ? within == distance(p) : within > most);
         }
     }
     EXPECT_TRUE(std::isinf(BorderDistance(Loops{})({0, 0})));
