@@ -333,6 +333,30 @@ TEST(Sheets, StacksAlongEveryAxis) {
     EXPECT_THROW((void)along_axis(mesh, 'w'), Error);
 }
 
+// Of a step of 25 mm2, and one that no sheets in stock add up to.
+TEST(Sheets, HeightsOfLevelFacesAreJoints) {
+    Context context;
+    const Mesh mesh = loft(context, {circle(0, 40, 48), circle(9, 40, 48), circle(9, 39.9, 48),
+                                     circle(20, 39.9, 48), circle(20, 39.8, 48), circle(36, 39.8, 48)});
+    SheetJob job = job_of(SheetHead::laser);
+    job.slicing.thicknesses = {9, 18};
+    const auto joints_of = [&](double keep) {
+        job.keep_flats_mm2 = keep;
+        return plan_sheets(context, mesh, job);
+    };
+    EXPECT_EQ(joints_of(0).pieces.size(), 2u);
+    EXPECT_EQ(joints_of(30).pieces.size(), 2u);
+    const SheetsPlan plan = joints_of(20);
+    ASSERT_EQ(plan.pieces.size(), 3u);
+    EXPECT_NEAR(plan.pieces[0].span.top, 9, 1e-6);
+    EXPECT_EQ(plan.job.slicing.joints.size(), 0u) << "the job stays as it was given";
+    const auto told_joint = std::find_if(plan.diagnostics.begin(), plan.diagnostics.end(),
+                                         [](const Diagnostic& d) { return d.code == "sheets.joint"; });
+    ASSERT_NE(told_joint, plan.diagnostics.end());
+    EXPECT_NE(told_joint->message.find("at 20 mm"), std::string::npos) << told_joint->message;
+    EXPECT_TRUE(proof_of(context, mesh, texts_of(plan)).passed);
+}
+
 TEST(Sheets, SameTextOnAnyNumberOfThreads) {
     std::vector<std::string> first;
     for (const int threads : {1, 2, 4}) {

@@ -132,6 +132,16 @@ void add_sheets_options(CLI::App& command, SheetsOptions& options) {
     command.add_option("--area", options.area, "percent by which areas may differ, printed")->check(length);
     command.add_option("--inset", options.most_inset, "mm: deepest stair of thicker sheets, optimal")
         ->check(length);
+    command
+        .add_option("--joint", options.joints,
+                    "mm over the foot where two sheets must meet, optimal; may be given again")
+        ->expected(1)
+        ->take_all()
+        ->check(over_0);
+    command
+        .add_option("--keep-flats", options.keep_flats,
+                    "mm2: sheets meet at every height that has level faces of so much, optimal")
+        ->check(over_0);
     command.add_option("--head", options.head, "what cuts: router, laser or jet (abrasive)")
         ->check(CLI::IsMember({"router", "laser", "jet"}));
     command.add_option("--kerf", options.kerf, "mm of the cut; the router's cutter")->check(length);
@@ -193,6 +203,8 @@ SheetJob sheet_job(const SheetsOptions& options) {
     job.slicing.triangle_mm2 = options.triangle;
     job.slicing.area_percent = options.area;
     job.slicing.most_inset = options.most_inset;
+    job.slicing.joints = options.joints;
+    job.keep_flats_mm2 = options.keep_flats;
     job.head = options.head == "router"  ? SheetHead::router
                : options.head == "laser" ? SheetHead::laser
                                          : SheetHead::jet;

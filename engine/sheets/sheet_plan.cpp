@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 
 #include "kernels/errors.h"
+#include "kernels/features/features.h"
 #include "kernels/polygons/border_distance.h"
 #include "kernels/slicing/slicing.h"
 
@@ -225,11 +227,23 @@ void tell_unmarked(SheetsPlan& plan) {
                          numbers));
 }
 
+void tell_missed_joints(SheetsPlan& plan) {
+    std::string heights;
+    for (const double z : plan.stack.missed)
+        heights += fmt::format("{}{:.4g}", heights.empty() ? "" : ", ", z);
+    if (!heights.empty())
+        tell(plan, Severity::warning, "sheets.joint",
+             fmt::format("no joint lies at {} mm, where one was to be kept: the sheets in stock do not add "
+                         "up to that",
+                         heights));
+}
+
 void tell_findings(SheetsPlan& plan, const std::vector<SheetCuts>& cuts, int on_the_way) {
     if (plan.stack.left_on_top > 0)
         tell(plan, Severity::warning, "sheets.left_on_top",
              fmt::format("{:.4f} mm on top are thinner than any sheet and are not made",
                          plan.stack.left_on_top));
+    tell_missed_joints(plan);
     for (std::size_t i = 0; i < plan.pieces.size(); ++i) {
         const SheetPiece& piece = plan.pieces[i];
         if (piece.islands > 1 && plan.job.alignment.way == SheetAlignment::none)
@@ -249,6 +263,25 @@ void tell_findings(SheetsPlan& plan, const std::vector<SheetCuts>& cuts, int on_
 }  // namespace
 
 namespace {
+
+/// Heights of level faces, up or down, that are at least so large together; the largest first.
+std::vector<double> flats_to_keep(Context& context, MeshView mesh, double least_mm2, double height) {
+    if (!(least_mm2 > 0)) return {};
+    constexpr double same = 1e-3;
+    std::map<std::int64_t, double> areas;  // by height in `same`
+    for (const Feature& feature : find_features(context, mesh).features) {
+        const bool is_flat = feature.type == FeatureType::up_flat || feature.type == FeatureType::down_flat;
+        if (is_flat && feature.z_low > same && feature.z_low < height - same)
+            areas[std::llround(feature.z_low / same)] += feature.area;
+    }
+    std::vector<std::pair<double, double>> flats;
+    for (const auto& [z, mm2] : areas)
+        if (mm2 >= least_mm2) flats.emplace_back(-mm2, double(z) * same);
+    std::sort(flats.begin(), flats.end());
+    std::vector<double> heights;
+    for (const auto& [mm2, z] : flats) heights.push_back(z);
+    return heights;
+}
 
 /// What holds the sheets; their outlines take it up. Empty where nothing is asked for.
 std::vector<SheetHold> hold_sheets(Context& context, MeshView mesh, const std::vector<SheetSpan>& spans,
@@ -435,7 +468,10 @@ SheetsPlan plan_sheets(Context& context, const Mesh& mesh, const SheetJob& job) 
     plan.job = job;
     plan.height = bounds(mesh.view()).max.z;
     context.begin_phase("sheets", 0, 0.5);
-    plan.stack = stack_of_sheets(context, mesh.view(), job.slicing);
+    SheetRules slicing = job.slicing;
+    for (const double flat : flats_to_keep(context, mesh.view(), job.keep_flats_mm2, plan.height))
+        slicing.joints.push_back(flat);
+    plan.stack = stack_of_sheets(context, mesh.view(), slicing);
     SheetRules uniform = job.slicing;
     uniform.strategy = SheetStrategy::uniform;
     plan.uniform_sheets = static_cast<std::size_t>((plan.height + uniform.bond + 1e-4) /

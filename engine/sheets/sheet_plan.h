@@ -29,7 +29,9 @@ struct SheetOffcut {
 
 struct SheetJob {
     SheetRules slicing;
-    SheetCutRules cutting;  ///< its kerf is the router's cutter
+    double keep_flats_mm2 = 0;  ///< heights of level faces of so much in all are joints too, the largest
+                                ///< first, after those of `slicing`; 0: none
+    SheetCutRules cutting;      ///< its kerf is the router's cutter
     AlignmentRules alignment;
     EngraveRules engraving;
     CornerRules corners;  ///< of a jet
