@@ -26,8 +26,9 @@ struct SheetsOptions {
     double engrave = 0, engrave_width = -1, digits = 10, engrave_feed = 1500, engrave_power = 20, power = 100;
     double taper = 0, pivot = 0, corner_feed = 50, corner = 1;
     int engrave_tool = 2;
-    std::string on = "M3", off = "M5";
+    std::string on, off, codes;   ///< "": of the codes, or as SheetJob has it; none
     std::vector<double> offcuts;  ///< thickness, length and width, one after another
+    std::vector<double> counts;   ///< thickness and number of whole sheets, one after another
     double price = 0, rate = 0;
     bool compare = false, nest = false, crate = false;
 };
