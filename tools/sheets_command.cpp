@@ -328,16 +328,19 @@ std::string sheets_verdict(const SheetProof& proof, const std::string& out) {
 
 namespace {
 
-/// What each way saves beside the first, as FDFF's table 4.1 has it: time and sheets.
-std::string saving_text(const std::vector<SheetCost>& costs) {
+/// How each way stands beside the first, as FDFF's table 4.1 has it: time and sheets.
+std::string compared_text(const std::vector<SheetCost>& costs) {
     std::string text;
     if (costs.size() < 2 || !costs[0].why_not.empty()) return text;
-    const auto saved = [](double of, double from) { return rounded_text(100 * (1 - of / from), 0); };
+    const auto change = [](double of, double from, const char* less) {
+        const double percent = 100 * (1 - of / from);
+        return fmt::format("{} % {}", rounded_text(std::abs(percent), 0), percent < 0 ? "more" : less);
+    };
     for (std::size_t i = 1; i < costs.size(); ++i)
         if (costs[i].why_not.empty())
-            text += fmt::format("saving    {} beside {}: {} % of the minutes, {} % of the sheets\n",
-                                costs[i].way, costs[0].way, saved(costs[i].minutes, costs[0].minutes),
-                                saved(double(costs[i].sheets), double(costs[0].sheets)));
+            text += fmt::format("{} beside {}: {} minutes, {} sheets\n", costs[i].way, costs[0].way,
+                                change(costs[i].minutes, costs[0].minutes, "fewer"),
+                                change(double(costs[i].sheets), double(costs[0].sheets), "fewer"));
     return text;
 }
 
@@ -390,7 +393,7 @@ std::string sheets_summary(const SheetsResult& result, const std::string& out, b
                             rounded_text(cost.part_kg, 2), rounded_text(cost.stock_kg, 2));
         text += cost.money > 0 ? fmt::format(", {} of money\n", rounded_text(cost.money, 2)) : "\n";
     }
-    text += saving_text(result.costs);
+    text += compared_text(result.costs);
     for (const Diagnostic& d : plan.diagnostics)
         if (d.severity != Severity::note) text += fmt::format("{}: {}\n", name(d.severity), d.message);
     return text + sheets_verdict(result.proof, out);

@@ -59,7 +59,7 @@ private:
     [[nodiscard]] std::optional<std::string> text(const char* name) const {
         const toml::node* node = table_.get(name);
         if (node == nullptr) return std::nullopt;
-        const auto value = node->value_exact<std::string>();
+        auto value = node->value_exact<std::string>();
         if (!value) wrong_type(node, name, "a text in quotes, such as \"M62 P0\"");
         return value;
     }

@@ -64,14 +64,15 @@ void append_plot(std::string& svg, const Plot& plot, std::size_t at) {
         svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n", x, y, anchor,
                            escaped(words));
     };
-    svg += fmt::format("<g transform=\"translate({} {})\">\n", kPlotWidth * double(at % kAcross),
-                       kPlotHeight * double(at / kAcross));
+    const std::size_t row = at / kAcross, column = at % kAcross;
+    svg += fmt::format("<g transform=\"translate({} {})\">\n", kPlotWidth * double(column),
+                       kPlotHeight * double(row));
     svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888\"/>\n",
                        kLeft, kTop, kWide, kHigh);
     text(kLeft + kWide / 2, kTop - 10, "middle", plot.title);
     text(kLeft + kWide / 2, kTop + kHigh + 34, "middle", plot.x_name);
     for (const double y : {ys[0], (ys[0] + ys[1]) / 2, ys[1]})
-        text(kLeft - 5, py(y) + 4, "end", fmt::format("{:.4g}", y));
+        text(kLeft - 5, py(y) + 4, "end", fmt::format("{:.4g}", std::abs(y) < 1e-9 * ys[1] ? 0 : y));
     auto marks = plot.x_marks;
     if (marks.empty())
         for (const double x : xs) marks.emplace_back(x, fmt::format("{:.4g}", x));
