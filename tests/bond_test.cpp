@@ -8,6 +8,7 @@
 
 #include "engine/bonding/bond_study.h"
 #include "io/read/bond_csv.h"
+#include "io/write/bond_plots.h"
 #include "io/write/bond_report.h"
 #include "kernels/errors.h"
 #include "kernels/statistics/distributions.h"
@@ -181,6 +182,9 @@ TEST(Distributions, AgreeWithTables) {
     EXPECT_NEAR(t_half_width(0.95, 12), 2.1788, 5e-5);
     EXPECT_NEAR(t_two_sided(t_half_width(0.9, 5), 5), 0.1, 1e-12);
     EXPECT_NEAR(t_two_sided(1, 1), 0.5, 1e-12) << "Cauchy's quartile";
+    EXPECT_NEAR(normal_quantile(0.975), 1.959964, 1e-6);
+    EXPECT_NEAR(normal_quantile(0.2), -normal_quantile(0.8), 1e-12);
+    EXPECT_THROW((void)normal_quantile(0), Error);
     EXPECT_THROW((void)f_upper_tail(1, 0, 3), Error);
     EXPECT_THROW((void)t_half_width(1, 3), Error);
     EXPECT_THROW((void)t_two_sided(std::nan(""), 3), Error);
@@ -263,6 +267,40 @@ TEST(BondCommand, TellsWhetherTheRegressionFits) {
     EXPECT_NEAR(document["anova"]["error_ss"].get<double>(), 1820703, 0.5);
     EXPECT_EQ(document["cells"].size(), 12u);
     EXPECT_EQ(document["cells"][document["best_cell"].get<std::size_t>()]["mean"], 7780);
+}
+
+int count_of(const std::string& text, const std::string& part) {
+    int n = 0;
+    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+    return n;
+}
+
+// 3 factors of 3, 2 and 2 levels, their 3 pairs, and 24 tests in 3 ways.
+TEST(BondCommand, PlotsEffectsInteractionsAndWhatIsLeft) {
+    const TemporaryFolder folder;
+    const std::string file = folder / "plots.svg";
+    const auto told = run_command({command, "bond", brazing, "--ignore", "run", "--plots", file});
+    ASSERT_EQ(told.exit, 0) << told.err;
+    const std::string svg = support::slurp(file);
+    EXPECT_EQ(count_of(svg, "<g transform"), 9);
+    EXPECT_EQ(count_of(svg, "<circle"), (3 + 2 + 2) + (6 + 6 + 4) + 3 * 24);
+    EXPECT_EQ(count_of(svg, "<g"), count_of(svg, "</g>"));
+    for (const char* part : {"strength by heating time", "heating time and sheet thickness",
+                             ">filler weight High<", "left by the regression", "a normal distribution"})
+        EXPECT_NE(svg.find(part), std::string::npos) << part;
+    EXPECT_EQ(run_command({command, "bond", brazing, "--plots", folder / "none/plots.svg"}).exit, 3);
+}
+
+// Names are text, not markup; two means of 1 and 3 at both ends of the axis, 2 between them.
+TEST(BondPlots, WordsAreEscapedAndMeansLieWhereTheyShould) {
+    const BondTests tests = read_text("a<b&c,y\nPU,0.5\nPU,1.5\nPVA,2.5\nPVA,3.5\n");
+    const std::string svg = bond_plots_svg(tests, study_bonds(tests));
+    EXPECT_NE(svg.find("y by a&lt;b&amp;c"), std::string::npos) << svg;
+    EXPECT_EQ(svg.find("a<b"), std::string::npos);
+    EXPECT_EQ(count_of(svg, "<circle"), 2 + 3 * 4);
+    const std::string first = svg.substr(0, svg.find("</g>"));
+    for (const char* part : {">0.84<", ">2<", ">3.16<", "M60.0 105.0H290.0"})
+        EXPECT_NE(first.find(part), std::string::npos) << part << '\n' << first;
 }
 
 TEST(BondCommand, WhatItCannotStudyItRefuses) {

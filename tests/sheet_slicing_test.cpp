@@ -265,6 +265,47 @@ TEST(SheetSlicing, OptimalIsTheBestOfAllStacks) {
     }
 }
 
+// A step so small that sheets reach across it, and sheets that meet there where they are told to.
+TEST(SheetSlicing, JointsAreKeptWhereAStackMeetsThem) {
+    Context context;
+    const Mesh mesh =
+        loft(context, {circle(0, 40, 48), circle(9, 40, 48), circle(9, 39.9, 48), circle(36, 39.9, 48)});
+    const auto stack_with = [&](std::vector<double> thicknesses, std::vector<double> joints) {
+        SheetRules rules;
+        rules.thicknesses = std::move(thicknesses);
+        rules.joints = std::move(joints);
+        const SheetStack stack = stack_of_sheets(context, mesh.view(), rules);
+        expect_stacked(stack, rules);
+        return stack;
+    };
+    const auto meet_at = [](const SheetStack& stack, double z) {
+        return std::any_of(stack.sheets.begin(), stack.sheets.end(),
+                           [&](const SheetSpan& span) { return std::abs(span.top - z) < 1e-6; });
+    };
+    const SheetStack free = stack_with({9, 18}, {});
+    EXPECT_EQ(free.sheets.size(), 2u);
+    EXPECT_FALSE(meet_at(free, 9));
+    const SheetStack kept = stack_with({9, 18}, {9});
+    EXPECT_EQ(kept.sheets.size(), 3u);
+    EXPECT_TRUE(meet_at(kept, 9));
+    EXPECT_TRUE(kept.missed.empty());
+    EXPECT_LT(kept.stair_mm3, free.stair_mm3);
+    // No sum of the thicknesses is 10: all is as without it, and told.
+    const SheetStack missed = stack_with({9, 18}, {10});
+    EXPECT_EQ(missed.sheets.size(), 2u);
+    EXPECT_EQ(missed.missed, std::vector<double>{10});
+    EXPECT_TRUE(meet_at(stack_with({8, 16, 20}, {8}), 8));
+    EXPECT_TRUE(meet_at(stack_with({8, 16, 20}, {28}), 28));
+    const SheetStack first = stack_with({16, 20}, {20, 16});
+    EXPECT_TRUE(meet_at(first, 20));
+    EXPECT_EQ(first.missed, std::vector<double>{16});
+    EXPECT_EQ(stack_with({16, 20}, {16, 20}).missed, std::vector<double>{20});
+    // A stack that meets 24 ends at 32.
+    const SheetStack high = stack_with({16, 20, 24}, {24});
+    EXPECT_EQ(high.left_on_top, 0);
+    EXPECT_EQ(high.missed, std::vector<double>{24});
+}
+
 // The stair of a cone and of a sphere in closed form, each side of it.
 TEST(SheetSlicing, StairIsTheClosedForm) {
     Context context;
@@ -307,6 +348,10 @@ TEST(SheetSlicing, RefusesWhatMakesNoStack) {
     EXPECT_EQ(code(rules), "sheets.rules");
     rules.thicknesses = {0, 3};
     EXPECT_EQ(code(rules), "sheets.rules");
+    rules.thicknesses = {3};
+    rules.joints = {-1};
+    EXPECT_EQ(code(rules), "sheets.rules");
+    rules.joints.clear();
     rules.thicknesses = {12};
     EXPECT_EQ(code(rules), "sheets.too_low");
     rules.thicknesses = {0.0017, 0.0019};
@@ -357,7 +402,11 @@ TEST(BorderDistance, IsThatOfTheNearestEdge) {
                     nearest = std::min(nearest, std::hypot(p.x - a.x - t * dx, p.y - a.y - t * dy));
                 }
             }
-            ASSERT_NEAR(distance(p), nearest / kUnitsPerMm, 1e-9);
+            nearest /= kUnitsPerMm;
+            ASSERT_NEAR(distance(p), nearest, 1e-9);
+            const double most = 2 * nearest * double(random()) / 4294967296.0;
+            const double within = distance.nearest_within(p, most).distance;
+            ASSERT_TRUE(nearest <= most ? within == distance(p) : within > most);
         }
     }
     EXPECT_TRUE(std::isinf(BorderDistance(Loops{})({0, 0})));

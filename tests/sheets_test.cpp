@@ -318,6 +318,79 @@ TEST(Sheets, StacksAlongEveryAxis) {
     EXPECT_THROW((void)along_axis(mesh, 'w'), Error);
 }
 
+// Gas before the first cut and after the last; words that would switch a head, or stand undeclared, are none.
+TEST(Sheets, WhatStandsBesideTheHeadIsSwitchedToo) {
+    Context context;
+    const Mesh mesh = vase(context);
+    for (const SheetHead head : {SheetHead::router, SheetHead::laser, SheetHead::jet}) {
+        SheetJob job = job_of(head);
+        job.begin = {"M7", "M64 P1"};
+        job.end = {"M65 P1", "M9"};
+        const std::vector<std::string> texts = texts_of(plan_sheets(context, mesh, job));
+        for (const std::string& text : texts) {
+            EXPECT_NE(text.find("\nM7\nM64 P1\n"), std::string::npos);
+            EXPECT_LT(text.rfind("X"), text.rfind("M65 P1\nM9\n"));
+            EXPECT_TRUE(support::interpret_rs274(text, "T1 P1 D6 Z0\n").ended);
+        }
+        EXPECT_TRUE(proof_of(context, mesh, texts).passed);
+        std::string untold = texts[0];
+        untold.erase(untold.find("(beside the head M7)\n"), 21);
+        EXPECT_THROW((void)read_sheet_program(untold, "x"), Error);
+        for (const char* wrong : {"M3", "M5", "M2", "M6", "G1 X5", "M7\nM3", ""}) {
+            job.begin = {wrong};
+            EXPECT_THROW((void)plan_sheets(context, mesh, job), Error) << wrong;
+        }
+    }
+}
+
+TEST(Sheets, ThereAreOnlySoManySheets) {
+    Context context;
+    const Mesh mesh = loft(context, {circle(0, 40, 48), circle(24, 40, 48)});
+    SheetJob job = job_of(SheetHead::laser);
+    job.slicing.thicknesses = {6};
+    job.stock = {210, 110};  // two pieces on each
+    EXPECT_EQ(plan_sheets(context, mesh, job).programs.size(), 2u);
+    job.counts = {{6, 2}};
+    EXPECT_EQ(plan_sheets(context, mesh, job).programs.size(), 2u);
+    job.counts = {{6, 1}};
+    try {
+        (void)plan_sheets(context, mesh, job);
+        ADD_FAILURE() << "two sheets from one";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), "sheets.stock");
+        EXPECT_NE(std::string(error.what()).find("take 2 whole sheets, and there is 1"), std::string::npos)
+            << error.what();
+    }
+    job.offcuts = {{6, {120, 120}}, {6, {130, 110}}};  // one piece on each
+    EXPECT_EQ(plan_sheets(context, mesh, job).programs.size(), 3u);
+    job.counts = {{7, 1}};
+    EXPECT_THROW((void)plan_sheets(context, mesh, job), Error);
+}
+
+// Of a step of 25 mm2, and one that no sheets in stock add up to.
+TEST(Sheets, HeightsOfLevelFacesAreJoints) {
+    Context context;
+    const Mesh mesh = loft(context, {circle(0, 40, 48), circle(9, 40, 48), circle(9, 39.9, 48),
+                                     circle(20, 39.9, 48), circle(20, 39.8, 48), circle(36, 39.8, 48)});
+    SheetJob job = job_of(SheetHead::laser);
+    job.slicing.thicknesses = {9, 18};
+    const auto joints_of = [&](double keep) {
+        job.keep_flats_mm2 = keep;
+        return plan_sheets(context, mesh, job);
+    };
+    EXPECT_EQ(joints_of(0).pieces.size(), 2u);
+    EXPECT_EQ(joints_of(30).pieces.size(), 2u);
+    const SheetsPlan plan = joints_of(20);
+    ASSERT_EQ(plan.pieces.size(), 3u);
+    EXPECT_NEAR(plan.pieces[0].span.top, 9, 1e-6);
+    EXPECT_EQ(plan.job.slicing.joints.size(), 0u) << "the job stays as it was given";
+    const auto told_joint = std::find_if(plan.diagnostics.begin(), plan.diagnostics.end(),
+                                         [](const Diagnostic& d) { return d.code == "sheets.joint"; });
+    ASSERT_NE(told_joint, plan.diagnostics.end());
+    EXPECT_NE(told_joint->message.find("at 20 mm"), std::string::npos) << told_joint->message;
+    EXPECT_TRUE(proof_of(context, mesh, texts_of(plan)).passed);
+}
+
 TEST(Sheets, SameTextOnAnyNumberOfThreads) {
     std::vector<std::string> first;
     for (const int threads : {1, 2, 4}) {

@@ -4,7 +4,9 @@
 #include <string_view>
 
 #include "io/read/bond_csv.h"
+#include "io/write/bond_plots.h"
 #include "io/write/bond_report.h"
+#include "io/write/output_file.h"
 #include "kernels/errors.h"
 
 namespace slabwright {
@@ -59,6 +61,8 @@ CLI::App* add_bond_command(CLI::App& app, BondOptions& options) {
         ->check(CLI::Range(0.5, 0.9999));
     command->add_option("--runs", options.future_runs, "joints whose mean is foretold; 3 if not given")
         ->check(CLI::Range(1, 1000));
+    command->add_option("--plots", options.plots,
+                        "an SVG file: main effects, interactions, what the regression leaves");
     command->add_flag("--json", options.json, "the result as JSON, errors as JSON on stderr");
     return command;
 }
@@ -72,6 +76,7 @@ std::string run_bond(const BondOptions& options) {
     const BondTests tests = read_bond_csv(options.csv, {options.response, options.ignored});
     try {
         const BondStudy study = study_bonds(tests, asked);
+        if (!options.plots.empty()) write_file_whole(options.plots, bond_plots_svg(tests, study));
         return options.json ? bond_json(tests, study, asked) : bond_text(tests, study, asked);
     } catch (const Error& error) {
         if (!error.place().empty()) throw;

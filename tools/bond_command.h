@@ -10,6 +10,7 @@ namespace slabwright {
 
 struct BondOptions {
     std::string csv, response, terms;
+    std::string plots;  ///< an SVG; "": none
     std::vector<std::string> ignored;
     int order = 0, future_runs = 3;
     double confidence = 0.95;

@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 
+#include "io/read/sheet_post.h"
 #include "io/text/json_text.h"
 #include "io/write/plan_json.h"
 
@@ -37,6 +38,9 @@ AbrasiveJet jet_of(const SheetsOptions& options) {
 void add_head_options(CLI::App& command, SheetsOptions& options) {
     command.add_option("--on", options.on, "what switches a laser or a jet on: M3, or like \"M62 P0\"");
     command.add_option("--off", options.off, "what switches it off: M5, or like \"M63 P0\"");
+    command.add_option(
+        "--codes", options.codes,
+        "TOML: what the machine's codes are, for each head (io/FORMATS.md, A post for sheets)");
     command
         .add_option(
             "--pivot", options.pivot,
@@ -103,6 +107,12 @@ void add_cost_options(CLI::App& command, SheetsOptions& options) {
         ->expected(3)
         ->take_all()
         ->check(over_0);
+    command
+        .add_option("--count", options.counts,
+                    "mm and number: how many whole sheets of a thickness there are; may be given again")
+        ->expected(2)
+        ->take_all()
+        ->check(length);
     command.add_option("--price", options.price, "money for a cubic metre of sheets")->check(length);
     command.add_option("--rate", options.rate, "money for an hour of the machine")->check(length);
     command.add_flag("--compare", options.compare, "plan uniform, adaptive and tilted cuts side by side");
@@ -132,6 +142,16 @@ void add_sheets_options(CLI::App& command, SheetsOptions& options) {
     command.add_option("--area", options.area, "percent by which areas may differ, printed")->check(length);
     command.add_option("--inset", options.most_inset, "mm: deepest stair of thicker sheets, optimal")
         ->check(length);
+    command
+        .add_option("--joint", options.joints,
+                    "mm over the foot where two sheets must meet, optimal; may be given again")
+        ->expected(1)
+        ->take_all()
+        ->check(over_0);
+    command
+        .add_option("--keep-flats", options.keep_flats,
+                    "mm2: sheets meet at every height that has level faces of so much, optimal")
+        ->check(over_0);
     command.add_option("--head", options.head, "what cuts: router, laser or jet (abrasive)")
         ->check(CLI::IsMember({"router", "laser", "jet"}));
     command.add_option("--kerf", options.kerf, "mm of the cut; the router's cutter")->check(length);
@@ -193,6 +213,8 @@ SheetJob sheet_job(const SheetsOptions& options) {
     job.slicing.triangle_mm2 = options.triangle;
     job.slicing.area_percent = options.area;
     job.slicing.most_inset = options.most_inset;
+    job.slicing.joints = options.joints;
+    job.keep_flats_mm2 = options.keep_flats;
     job.head = options.head == "router"  ? SheetHead::router
                : options.head == "laser" ? SheetHead::laser
                                          : SheetHead::jet;
@@ -206,12 +228,13 @@ SheetJob sheet_job(const SheetsOptions& options) {
                                                                                    : 0;
     job.engraving = engraving_of(options, job.cutting.kerf);
     job.power = options.power;
-    job.on = options.on;
     job.cutting.taper_deg = options.taper;
     job.pivot = options.pivot;
     job.corners.share = options.corner_feed / 100;
     job.corners.reach = options.corner;
-    job.off = options.off;
+    if (!options.codes.empty()) apply(read_sheet_post(options.codes), job);
+    if (!options.on.empty()) job.on = options.on;
+    if (!options.off.empty()) job.off = options.off;
     job.cutting.leave = options.leave;
     job.nesting.spacing = options.gap;
     job.nesting.margin = options.margin;
@@ -237,6 +260,8 @@ SheetJob sheet_job(const SheetsOptions& options) {
     job.alignment.gap = options.tab_gap;
     for (std::size_t i = 0; i + 2 < options.offcuts.size(); i += 3)
         job.offcuts.push_back({options.offcuts[i], {options.offcuts[i + 1], options.offcuts[i + 2]}});
+    for (std::size_t i = 0; i + 1 < options.counts.size(); i += 2)
+        job.counts.push_back({options.counts[i], static_cast<int>(options.counts[i + 1])});
     return job;
 }
 
@@ -301,6 +326,26 @@ std::string sheets_verdict(const SheetProof& proof, const std::string& out) {
     return text;
 }
 
+namespace {
+
+/// How each way stands beside the first, as FDFF's table 4.1 has it: time and sheets.
+std::string compared_text(const std::vector<SheetCost>& costs) {
+    std::string text;
+    if (costs.size() < 2 || !costs[0].why_not.empty()) return text;
+    const auto change = [](double of, double from, const char* less) {
+        const double percent = 100 * (1 - of / from);
+        return fmt::format("{} % {}", rounded_text(std::abs(percent), 0), percent < 0 ? "more" : less);
+    };
+    for (std::size_t i = 1; i < costs.size(); ++i)
+        if (costs[i].why_not.empty())
+            text += fmt::format("{} beside {}: {} minutes, {} sheets\n", costs[i].way, costs[0].way,
+                                change(costs[i].minutes, costs[0].minutes, "fewer"),
+                                change(double(costs[i].sheets), double(costs[0].sheets), "fewer"));
+    return text;
+}
+
+}  // namespace
+
 std::string sheets_summary(const SheetsResult& result, const std::string& out, bool json) {
     const SheetsPlan& plan = result.plan;
     if (json) {
@@ -348,6 +393,7 @@ std::string sheets_summary(const SheetsResult& result, const std::string& out, b
                             rounded_text(cost.part_kg, 2), rounded_text(cost.stock_kg, 2));
         text += cost.money > 0 ? fmt::format(", {} of money\n", rounded_text(cost.money, 2)) : "\n";
     }
+    text += compared_text(result.costs);
     for (const Diagnostic& d : plan.diagnostics)
         if (d.severity != Severity::note) text += fmt::format("{}: {}\n", name(d.severity), d.message);
     return text + sheets_verdict(result.proof, out);

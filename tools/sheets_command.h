@@ -19,14 +19,16 @@ struct SheetsOptions {
     double pressure = 350, orifice = 0.35, insert = 1.02, abrasive = 0.12, energy = 13.6;
     int tool = 1;
     bool grain = false;
-    double tolerance = 0;
+    double tolerance = 0, keep_flats = 0;
+    std::vector<double> joints;  ///< mm over the foot
     std::string align = "none", material = "mdf", bonding;
     double dowel = 8, wall = 4, tab = 24, neck = 6, tab_gap = 6;
     double engrave = 0, engrave_width = -1, digits = 10, engrave_feed = 1500, engrave_power = 20, power = 100;
     double taper = 0, pivot = 0, corner_feed = 50, corner = 1;
     int engrave_tool = 2;
-    std::string on = "M3", off = "M5";
+    std::string on, off, codes;   ///< "": of the codes, or as SheetJob has it; none
     std::vector<double> offcuts;  ///< thickness, length and width, one after another
+    std::vector<double> counts;   ///< thickness and number of whole sheets, one after another
     double price = 0, rate = 0;
     bool compare = false, nest = false, crate = false;
 };

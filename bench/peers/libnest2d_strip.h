@@ -17,5 +17,7 @@ struct PeerStrip {
 /// @param width of the strip along x, 0.1 µm; along y it has 20 m
 /// @param turns in degrees. @param along_strip pieces lie as far back on the strip as they go; otherwise by
 /// libnest2d's own rule
+/// @param as_hulls pieces keep clear of each other by their convex hulls: it lays other pieces one over the
+/// other
 PeerStrip pack_by_libnest2d(const std::vector<PeerPolygon>& pieces, std::int64_t width,
-                            const std::vector<int>& turns, bool along_strip);
+                            const std::vector<int>& turns, bool along_strip, bool as_hulls);

@@ -112,7 +112,7 @@ std::vector<double> NearPart::too_near(const AxisLoop& axis, double allowed) con
             const Point2 p = sheet_.sections[k]->points[v];
             const bool is_own = owners_[vertex++] == static_cast<std::size_t>(axis.loop);
             const bool stays = !is_own || is_around[v] != axis.is_hole;
-            const NearestEdge near = to_axis.nearest(p);
+            const NearestEdge near = stays ? to_axis.nearest_within(p, widest) : to_axis.nearest(p);
             if (stays && near.distance >= widest - allowed) continue;
             const std::size_t next = (near.edge + 1) % own.points.size();
             const double need = need_beside(axis, own.points, near.edge, height, kerf);
@@ -122,9 +122,10 @@ std::vector<double> NearPart::too_near(const AxisLoop& axis, double allowed) con
             lacks[next] = std::max(lacks[next], more);
         }
         for (std::size_t i = 0; i < own.points.size(); ++i) {
-            const double distance = borders_[k](own.points[i]);
             const double need = std::max(need_beside(axis, own.points, i, height, kerf),
                                          need_beside(axis, own.points, (i + n - 1) % n, height, kerf));
+            const double distance = is_in_part[i] ? borders_[k](own.points[i])
+                                                  : borders_[k].nearest_within(own.points[i], need).distance;
             const double more = need + (is_in_part[i] ? distance : -distance);
             if (more > allowed) lacks[i] = std::max(lacks[i], more);
         }

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 
 #include "kernels/errors.h"
+#include "kernels/features/features.h"
 #include "kernels/polygons/border_distance.h"
 #include "kernels/slicing/slicing.h"
 
@@ -17,6 +19,11 @@ namespace slabwright {
 namespace {
 
 constexpr double kHeadTolerance = 0.005;  ///< mm by which the bottom of a cut may leave its line
+
+bool is_stocked(const SheetJob& job, double thickness) {
+    return std::any_of(job.slicing.thicknesses.begin(), job.slicing.thicknesses.end(),
+                       [&](double t) { return std::abs(t - thickness) < 1e-6; });
+}
 
 void require_job(const SheetJob& job) {
     const auto refuse = [](const std::string& what, const char* remedy) {
@@ -40,8 +47,7 @@ void require_job(const SheetJob& job) {
         if (!(value >= 0) || value > 2000)
             refuse("lead, pierce, pivot and depth under the sheet must be 0 or more", "");
     for (const SheetOffcut& offcut : job.offcuts)
-        if (std::none_of(job.slicing.thicknesses.begin(), job.slicing.thicknesses.end(),
-                         [&](double t) { return std::abs(t - offcut.thickness) < 1e-6; }))
+        if (!is_stocked(job, offcut.thickness))
             refuse(fmt::format("an offcut of {:.4g} mm is of no thickness in stock", offcut.thickness),
                    "give its thickness to --thickness too");
     if (job.head == SheetHead::router && !(job.cutting.kerf > 0))
@@ -51,6 +57,17 @@ void require_job(const SheetJob& job) {
             "a laser or a jet is switched by two M words (3 to 5, 7 to 9, 62 to 65, 100 to 199), each with a "
             "P word or none",
             "give --on and --off like \"M62 P0\" and \"M63 P0\"");
+    for (const auto* lines : {&job.begin, &job.end})
+        for (const std::string& line : *lines)
+            if (!is_switch(line) || line == job.on || line == job.off || line == "M3" || line == "M4" ||
+                line == "M5")
+                refuse("\"" + line.substr(0, 40) + "\" switches nothing beside the head",
+                       "give M words (7 to 9, 62 to 65, 100 to 199), each with a P word or none");
+    for (const SheetCount& count : job.counts)
+        if (!is_stocked(job, count.thickness) || count.sheets < 0)
+            refuse(fmt::format("{} sheets of {:.4g} mm are of no thickness in stock", count.sheets,
+                               count.thickness),
+                   "give its thickness to --thickness too");
     if (!(job.corners.share > 0) || job.corners.share > 1 || !(job.corners.reach >= 0))
         refuse("at corners the feed is over 0 and no more than the whole", "give --corner-feed in percent");
     if (job.engraving.depth == 0) return;
@@ -225,11 +242,23 @@ void tell_unmarked(SheetsPlan& plan) {
                          numbers));
 }
 
+void tell_missed_joints(SheetsPlan& plan) {
+    std::string heights;
+    for (const double z : plan.stack.missed)
+        heights += fmt::format("{}{:.4g}", heights.empty() ? "" : ", ", z);
+    if (!heights.empty())
+        tell(plan, Severity::warning, "sheets.joint",
+             fmt::format("no joint lies at {} mm, where one was to be kept: the sheets in stock do not add "
+                         "up to that",
+                         heights));
+}
+
 void tell_findings(SheetsPlan& plan, const std::vector<SheetCuts>& cuts, int on_the_way) {
     if (plan.stack.left_on_top > 0)
         tell(plan, Severity::warning, "sheets.left_on_top",
              fmt::format("{:.4f} mm on top are thinner than any sheet and are not made",
                          plan.stack.left_on_top));
+    tell_missed_joints(plan);
     for (std::size_t i = 0; i < plan.pieces.size(); ++i) {
         const SheetPiece& piece = plan.pieces[i];
         if (piece.islands > 1 && plan.job.alignment.way == SheetAlignment::none)
@@ -249,6 +278,25 @@ void tell_findings(SheetsPlan& plan, const std::vector<SheetCuts>& cuts, int on_
 }  // namespace
 
 namespace {
+
+/// Heights of level faces, up or down, that are at least so large together; the largest first.
+std::vector<double> flats_to_keep(Context& context, MeshView mesh, double least_mm2, double height) {
+    if (!(least_mm2 > 0)) return {};
+    constexpr double same = 1e-3;
+    std::map<std::int64_t, double> areas;  // by height in `same`
+    for (const Feature& feature : find_features(context, mesh).features) {
+        const bool is_flat = feature.type == FeatureType::up_flat || feature.type == FeatureType::down_flat;
+        if (is_flat && feature.z_low > same && feature.z_low < height - same)
+            areas[std::llround(feature.z_low / same)] += feature.area;
+    }
+    std::vector<std::pair<double, double>> flats;
+    for (const auto& [z, mm2] : areas)
+        if (mm2 >= least_mm2) flats.emplace_back(-mm2, double(z) * same);
+    std::sort(flats.begin(), flats.end());
+    std::vector<double> heights;
+    for (const auto& [mm2, z] : flats) heights.push_back(z);
+    return heights;
+}
 
 /// What holds the sheets; their outlines take it up. Empty where nothing is asked for.
 std::vector<SheetHold> hold_sheets(Context& context, MeshView mesh, const std::vector<SheetSpan>& spans,
@@ -327,6 +375,28 @@ std::vector<std::size_t> from_inside(const SheetCuts& cuts) {
     return order;
 }
 
+/// Offcuts are used before whole sheets.
+void require_sheets(const SheetJob& job, double thickness, const Nest& nest,
+                    const std::vector<StockSheet>& offcuts) {
+    const auto is_offcut = [&](const StockSheet& sheet) {
+        return std::any_of(offcuts.begin(), offcuts.end(), [&](const StockSheet& offcut) {
+            return offcut.length == sheet.length && offcut.width == sheet.width;
+        });
+    };
+    const bool alike = is_offcut(job.stock);  // then the first ones are offcuts
+    const auto rests =
+        alike ? std::min(nest.stock.size(), offcuts.size())
+              : static_cast<std::size_t>(std::count_if(nest.stock.begin(), nest.stock.end(), is_offcut));
+    const std::size_t whole = nest.stock.size() - rests;
+    for (const SheetCount& count : job.counts)
+        if (std::abs(count.thickness - thickness) < 1e-6 && whole > static_cast<std::size_t>(count.sheets))
+            throw Error(
+                ErrorKind::no_plan, "sheets.stock",
+                fmt::format("the pieces of {:.4g} mm take {} whole {}, and there {} {}", thickness, whole,
+                            whole == 1 ? "sheet" : "sheets", count.sheets == 1 ? "is" : "are", count.sheets),
+                "", "leave that thickness out of --thickness, or get more");
+}
+
 /// Lays the pieces of one thickness on their stock, and their cuts in its programs.
 /// @returns how many cuts have no room for a lead
 int lay_pieces(Context& context, SheetsPlan& plan, std::size_t t, const std::vector<SheetCuts>& cuts,
@@ -342,6 +412,7 @@ int lay_pieces(Context& context, SheetsPlan& plan, std::size_t t, const std::vec
     for (const SheetOffcut& offcut : job.offcuts)
         if (std::abs(offcut.thickness - job.slicing.thicknesses[t]) < 1e-6) offcuts.push_back(offcut.size);
     const Nest nest = nest_pieces(context, own_blanks, job.stock, offcuts, job.nesting);
+    require_sheets(job, job.slicing.thicknesses[t], nest, offcuts);
     const std::size_t first = plan.programs.size();
     for (const StockSheet& stock : nest.stock) {
         SheetProgram program;
@@ -435,7 +506,10 @@ SheetsPlan plan_sheets(Context& context, const Mesh& mesh, const SheetJob& job) 
     plan.job = job;
     plan.height = bounds(mesh.view()).max.z;
     context.begin_phase("sheets", 0, 0.5);
-    plan.stack = stack_of_sheets(context, mesh.view(), job.slicing);
+    SheetRules slicing = job.slicing;
+    for (const double flat : flats_to_keep(context, mesh.view(), job.keep_flats_mm2, plan.height))
+        slicing.joints.push_back(flat);
+    plan.stack = stack_of_sheets(context, mesh.view(), slicing);
     SheetRules uniform = job.slicing;
     uniform.strategy = SheetStrategy::uniform;
     plan.uniform_sheets = static_cast<std::size_t>((plan.height + uniform.bond + 1e-4) /

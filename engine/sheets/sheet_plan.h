@@ -27,15 +27,24 @@ struct SheetOffcut {
     StockSheet size;
 };
 
+/// How many whole sheets of a thickness there are; of one that no such line names, as many as it takes.
+struct SheetCount {
+    double thickness = 0;  ///< mm
+    int sheets = 0;
+};
+
 struct SheetJob {
     SheetRules slicing;
-    SheetCutRules cutting;  ///< its kerf is the router's cutter
+    double keep_flats_mm2 = 0;  ///< heights of level faces of so much in all are joints too, the largest
+                                ///< first, after those of `slicing`; 0: none
+    SheetCutRules cutting;      ///< its kerf is the router's cutter
     AlignmentRules alignment;
     EngraveRules engraving;
     CornerRules corners;  ///< of a jet
     NestRules nesting;    ///< spacing is between kerfs and leads
     StockSheet stock{1220, 1220};
     std::vector<SheetOffcut> offcuts;
+    std::vector<SheetCount> counts;
     SheetHead head = SheetHead::router;
     char axis = 'z';        ///< along which sheets are stacked
     double lead = 3;        ///< mm of waste in which a cut begins
@@ -47,8 +56,10 @@ struct SheetJob {
     double plunge_feed = 800, stepdown = 6, rpm = 18000;  ///< router
     double through = 0.2;                                 ///< mm that a router cuts under the sheet
     int tool = 1;
-    double power = 100;                 ///< laser: its S word while it cuts; stated where it engraves too
-    std::string on = "M3", off = "M5";  ///< what switches a laser or a jet: is_switch()
+    double power = 100;                   ///< laser: its S word while it cuts; stated where it engraves too
+    std::string on = "M3", off = "M5";    ///< what switches a laser or a jet: is_switch()
+    std::vector<std::string> begin, end;  ///< what switches gas, dust or abrasive before the first cut and
+                                          ///< after the last: is_switch(), none that switches a head
     AbrasiveJet jet;
 };
 
@@ -111,7 +122,8 @@ struct SheetsPlan {
 
 /// @param mesh as along_axis() makes it, with neighbours
 /// @throws as stack_of_sheets(), cuts_of() and nest_pieces(), Error(usage, "sheets.job") for values out of
-/// range or a head that does not tilt and should
+/// range or a head that does not tilt and should, Error(no_plan, "sheets.stock") where there are too few
+/// sheets
 [[nodiscard]] SheetsPlan plan_sheets(Context& context, const Mesh& mesh, const SheetJob& job);
 
 }  // namespace slabwright

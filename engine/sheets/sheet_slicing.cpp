@@ -246,6 +246,10 @@ struct Reached {
     int from = -1, stock = -1;  ///< height index and sheet below
 };
 
+bool crosses(const SheetSpan& span, double joint) {
+    return joint > span.bottom + kSame && joint < span.top - kSame;
+}
+
 /// All stacks of sheets, from below. Heights are those at which a sheet may begin.
 class StackSearch {
 public:
@@ -261,7 +265,7 @@ public:
         // found[n][h]: n sheets, the next one would begin at height h.
         std::vector<std::vector<Reached>> found{std::vector<Reached>(heights_.size())};
         found[0][0].error = 0;
-        const std::size_t end = last_height();
+        const std::size_t end = last_height(choices_);
         std::size_t least = 0;
         for (std::size_t n = 1; n <= heights_.size(); ++n) {
             found.emplace_back(heights_.size());
@@ -318,26 +322,36 @@ private:
                    : heights_.size();
     }
 
-    /// Where no kept joint lies inside a sheet that could have been avoided.
-    [[nodiscard]] bool crosses_joint(const SheetSpan& span) const {
-        for (const double joint : rules_.joints)
-            if (joint > span.bottom + kSame && joint < span.top - kSame &&
-                (at_height(joint) < heights_.size() || at_height(joint + rules_.bond) < heights_.size()))
-                return true;
-        return false;
-    }
-
-    void weigh() {
-        std::vector<SheetSpan> spans;
+    /// Every sheet at every height, as far as the part goes.
+    [[nodiscard]] std::vector<Choice> all_choices() const {
         std::vector<Choice> choices;
         for (std::size_t h = 0; h < heights_.size(); ++h)
             for (int t = 0; t < static_cast<int>(rules_.thicknesses.size()); ++t) {
                 const SheetSpan span = span_at(heights_[h], t, rules_);
                 const std::size_t to = at_height(span.top + rules_.bond);
-                if (to == heights_.size() || span.top > height_ + kSame || crosses_joint(span)) continue;
-                spans.push_back(span);
-                choices.push_back({h, to, t, 0});
+                if (to < heights_.size() && span.top <= height_ + kSame) choices.push_back({h, to, t, 0});
             }
+        return choices;
+    }
+
+    /// Leaves out what reaches across a joint, for each joint that then still has a stack as high.
+    void keep_joints(std::vector<Choice>& choices) const {
+        const std::size_t highest = last_height(choices);
+        for (const double joint : rules_.joints) {
+            std::vector<Choice> spared;
+            for (const Choice& choice : choices)
+                if (!crosses(span_at(heights_[choice.from], choice.stock, rules_), joint))
+                    spared.push_back(choice);
+            if (last_height(spared) == highest) choices = std::move(spared);
+        }
+    }
+
+    void weigh() {
+        std::vector<Choice> choices = all_choices();
+        keep_joints(choices);
+        std::vector<SheetSpan> spans;
+        for (const Choice& choice : choices)
+            spans.push_back(span_at(heights_[choice.from], choice.stock, rules_));
         StairMeter meter(context_, mesh_, rules_.side, rules_.most_inset > 0);
         meter.measure(spans, [&](std::size_t i, const SheetStair& stair) {
             if (rules_.most_inset > 0 && choices[i].stock > 0 && stair.inset > rules_.most_inset) return;
@@ -347,10 +361,10 @@ private:
     }
 
     /// The highest that a stack reaches.
-    [[nodiscard]] std::size_t last_height() const {
+    [[nodiscard]] std::size_t last_height(const std::vector<Choice>& choices) const {
         std::vector<bool> reached(heights_.size(), false);
         reached[0] = true;
-        for (const Choice& choice : choices_)  // ordered by where they begin
+        for (const Choice& choice : choices)  // ordered by where they begin
             if (reached[choice.from]) reached[choice.to] = true;
         std::size_t last = 0;
         for (std::size_t h = 0; h < reached.size(); ++h)
@@ -392,6 +406,8 @@ void require_rules(const SheetRules& rules) {
     if (!(rules.bond >= 0) || !(rules.bond < 1e3) || !(rules.triangle_mm2 >= 0) ||
         !(rules.area_percent >= 0) || !(rules.most_inset >= 0))
         refuse("bond and tolerances must be 0 or more", "see `slabwright sheets --help`");
+    for (const double joint : rules.joints)
+        if (!(joint > 0) || !(joint < 1e5)) refuse("a joint lies over 0 mm", "give heights over the foot");
 }
 
 }  // namespace
@@ -452,6 +468,10 @@ SheetStack stack_of_sheets(Context& context, MeshView mesh, const SheetRules& ru
         stack.stair_mm3 += stair.volume_mm3;
     stack.left_on_top = std::max(0.0, height - stack.sheets.back().top);
     if (stack.left_on_top < kSame) stack.left_on_top = 0;
+    for (const double joint : rules.joints)
+        if (std::any_of(stack.sheets.begin(), stack.sheets.end(),
+                        [&](const SheetSpan& span) { return crosses(span, joint); }))
+            stack.missed.push_back(joint);
     return stack;
 }
 

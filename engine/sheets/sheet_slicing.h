@@ -28,8 +28,9 @@ struct SheetRules {
     double area_percent = 4;    ///< by which areas of a sheet's bottom and top may differ (FDFF)
     double most_inset = 0;      ///< mm, optimal: sheets over the thinnest whose stair is deeper are not used;
                                 ///< 0: no limit
-    std::vector<double>
-        joints;  ///< mm, optimal: heights that no sheet reaches across where a stack meets them
+    /// mm, optimal: heights that no sheet reaches across, the most important first. One that no stack meets
+    /// which is as high as without it, and meets those before it, is let go.
+    std::vector<double> joints;
 };
 
 /// One sheet of the stack.
@@ -49,6 +50,7 @@ struct SheetStack {
     std::vector<SheetSpan> sheets;  ///< from below
     double left_on_top = 0;         ///< mm of the part above the last sheet
     double stair_mm3 = 0;           ///< sum over the sheets
+    std::vector<double> missed;     ///< mm: of SheetRules::joints those within a sheet
 };
 
 /// The most heights that `optimal` looks at; more earn a refusal that names the cure.

@@ -203,8 +203,12 @@ std::string sheet_program_text(const SheetsPlan& plan, std::size_t index) {
     if (job.pivot > 0) text += fmt::format("(pivot {})\n", rounded_text(job.pivot, 4));
     if (!is_router && (job.on != "M3" || job.off != "M5"))
         text += fmt::format("(head on {} off {})\n", job.on, job.off);
+    std::vector<std::string> beside = job.begin;
+    beside.insert(beside.end(), job.end.begin(), job.end.end());
+    for (const std::string& line : beside) text += fmt::format("(beside the head {})\n", line);
     text += "G21 G17 G90 G94 G40 G49 G80\nG64 P0.005\nG54\n";
     if (is_router) text += tool_change(job, engraves ? job.engraving.tool : job.tool);
+    for (const std::string& line : job.begin) text += line + '\n';
     text += fmt::format("G0 Z{}\n", rounded_text(job.clearance, 4));
     WayText ways(text, job, program);
     if (engraves) {
@@ -217,6 +221,7 @@ std::string sheet_program_text(const SheetsPlan& plan, std::size_t index) {
         if (job.head == SheetHead::laser) text += fmt::format("S{}\n", rounded_text(job.power, 3));
     }
     for (const SheetWay& way : program.ways) ways.write(way);
+    for (const std::string& line : job.end) text += line + '\n';
     if (is_router) text += "M5\n";
     return text + "M2\n";
 }

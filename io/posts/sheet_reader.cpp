@@ -109,6 +109,8 @@ private:
             pivot_ = value(1);
         } else if (w.size() >= 5 && w[0] == "head" && w[1] == "on") {
             switches(text.substr(1, text.size() - 2));
+        } else if (w.size() >= 4 && w[0] == "beside" && w[1] == "the" && w[2] == "head") {
+            beside(std::string(text.substr(17, text.size() - 18)));
         } else if (w.size() == 9 && w[0] == "cut" && w[2] == "piece" && w[4] == "loop" && w[6] == "pass") {
             if (w[8] != "hole" && w[8] != "outline")
                 fail("gcode.comment", "a cut that is neither hole nor outline");
@@ -151,6 +153,13 @@ private:
             fail("gcode.switch", "words that do not switch a head");
     }
 
+    /// A line that switches something else: gas, dust, abrasive.
+    void beside(std::string line) {
+        if (!is_switch(line) || is_set_ || line == "M3" || line == "M4" || line == "M5")
+            fail("gcode.switch", "words beside the head that do not switch something else");
+        beside_.push_back(std::move(line));
+    }
+
     ReadPiece& piece_of(int number) {
         for (ReadPiece& piece : program_.pieces)
             if (piece.number == number) return piece;
@@ -166,6 +175,7 @@ private:
     void words(std::string_view text) {
         if (!has_stock_) fail("gcode.no_stock", "no comment says which stock it is for");
         if (!program_.is_routed && (text == on_text_ || text == off_text_)) return switched(text == on_text_);
+        if (std::find(beside_.begin(), beside_.end(), text) != beside_.end()) return;
         Block block{x_, y_, z_, a_, c_};
         for (const std::string_view word : split(text)) take(word, block);
         if (block.changes || block.offsets) change_tool(block);
@@ -354,6 +364,7 @@ private:
     double pivot_ = 0;  // mm
     int tool_ = 0;
     std::string on_text_ = "M3", off_text_ = "M5";
+    std::vector<std::string> beside_;
     bool has_stock_ = false, ended_ = false, named_ = false, rapid_ = true, on_ = false, inverse_ = false;
     bool has_mm_ = false, has_absolute_ = false, is_set_ = false, has_length_ = false;
     bool is_engraving_ = false;

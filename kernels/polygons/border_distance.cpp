@@ -75,6 +75,14 @@ void BorderDistance::look_in(std::int64_t column, std::int64_t row, Point2 p, Sq
 }
 
 NearestEdge BorderDistance::nearest(Point2 p) const {
+    return look_around(p, std::numeric_limits<double>::infinity());
+}
+
+NearestEdge BorderDistance::nearest_within(Point2 p, double most) const {
+    return look_around(p, most * kUnitsPerMm);
+}
+
+NearestEdge BorderDistance::look_around(Point2 p, double most) const {
     Square nearest{std::numeric_limits<double>::infinity(), 0};
     if (ends_.empty()) return {0, nearest.distance};
     const auto floor_div = [&](std::int64_t v) { return v >= 0 ? v / cell_ : -((-v + cell_ - 1) / cell_); };
@@ -87,7 +95,7 @@ NearestEdge BorderDistance::nearest(Point2 p) const {
         {std::abs(column), std::abs(column - (columns_ - 1)), std::abs(row), std::abs(row - (rows_ - 1))});
     for (std::int64_t ring = first; ring <= last; ++ring) {
         const double seen = double(std::max<std::int64_t>(ring - 1, 0)) * double(cell_);
-        if (nearest.distance <= seen * seen) break;
+        if (nearest.distance <= seen * seen || seen > most) break;
         const std::int64_t r0 = std::max<std::int64_t>(row - ring, 0), r1 = std::min(row + ring, rows_ - 1);
         for (std::int64_t r = r0; r <= r1; ++r) {
             const bool whole = r == row - ring || r == row + ring;

@@ -22,6 +22,9 @@ public:
     /// mm; infinite where there are no loops.
     [[nodiscard]] double operator()(Point2 p) const { return nearest(p).distance; }
     [[nodiscard]] NearestEdge nearest(Point2 p) const;  ///< of several found at once the first
+    /// The same where an edge is within `most` mm; where none is, the distance is some value over that. Takes
+    /// no longer the farther away the edges are.
+    [[nodiscard]] NearestEdge nearest_within(Point2 p, double most) const;
 
 private:
     struct Square {
@@ -29,6 +32,7 @@ private:
         std::uint32_t edge = 0;
     };
     void look_in(std::int64_t column, std::int64_t row, Point2 p, Square& nearest) const;
+    [[nodiscard]] NearestEdge look_around(Point2 p, double most) const;  ///< most in units
     const Loops& loops_;
     std::vector<std::uint32_t> ends_;  ///< of each edge, the index of its second point
     std::int64_t x0_ = 0, y0_ = 0, cell_ = 1, columns_ = 0, rows_ = 0;

@@ -1,6 +1,7 @@
 #include "kernels/statistics/distributions.h"
 
 #include <boost/math/distributions/fisher_f.hpp>
+#include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
@@ -36,6 +37,11 @@ double t_two_sided(double value, double df) {
 double t_half_width(double confidence, double df) {
     require(confidence > 0 && confidence < 1 && df >= 1);
     return boost::math::quantile(complement(boost::math::students_t(df), (1 - confidence) / 2));
+}
+
+double normal_quantile(double lower) {
+    require(lower > 0 && lower < 1);
+    return boost::math::quantile(boost::math::normal(), lower);
 }
 
 }  // namespace slabwright

@@ -1,4 +1,4 @@
-// The F and t distributions, as far as tests of hypotheses need them.
+// The F, t and normal distributions, as far as tests of hypotheses need them.
 #pragma once
 
 namespace slabwright {
@@ -17,5 +17,9 @@ namespace slabwright {
 /// The half width, in standard errors, of the two-sided interval that holds with `confidence`, in (0, 1).
 /// @throws as f_upper_tail
 [[nodiscard]] double t_half_width(double confidence, double df);
+
+/// The value that a normal distribution of mean 0 and deviation 1 stays under with probability `lower`, in
+/// (0, 1). @throws as f_upper_tail
+[[nodiscard]] double normal_quantile(double lower);
 
 }  // namespace slabwright
