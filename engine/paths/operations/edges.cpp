@@ -136,7 +136,7 @@ private:
         add(tools.rough);
         double finest = kAlong * kUnitsPerMm;
         for (const EdgeTool& t : tools_)
-            finest = std::min(finest, double{safe_step(t.radius, cut_.job.tolerances.gouge)});
+            finest = std::min(finest, static_cast<double>(safe_step(t.radius, cut_.job.tolerances.gouge)));
         along_ = finest / kUnitsPerMm;
     }
     void add(const Tool& tool) {

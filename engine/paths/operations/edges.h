@@ -17,6 +17,6 @@ namespace slabwright {
 [[nodiscard]] std::vector<Operation> follow_edges(const LayerCut& cut, LayerStock& stock);
 
 /// How far from an edge, seen from above, something is taken to stand beside it, mm.
-inline constexpr double kEdgeBand = 0.75;
+inline constexpr double kEdgeBand = 0.4;
 
 }  // namespace slabwright
