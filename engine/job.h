@@ -273,6 +273,7 @@ struct Cutting {
         true;  ///< deep cuts in several passes where no feed will do (engine/forces/feeds.h), likewise
     bool arcs = true;            ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
     bool edges = false;          ///< sharp edges are followed where something stands beside them (FINISH 3.2)
+    bool bore_holes = false;     ///< upright round holes for which no drill is there are bored on a helix
     double edge_angle_deg = 30;  ///< by which faces turn at least at an edge that counts as sharp
 };
 

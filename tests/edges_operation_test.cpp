@@ -11,7 +11,9 @@
 #include "io/slabwright.h"
 #include "io/write/stl_writer.h"
 #include "tests/support/edge_error.h"
+#include "tests/support/files.h"
 #include "tests/support/height_field.h"
+#include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -62,6 +64,9 @@ TEST(EdgesOperation, LeavesLessAlongRidgesAndIsProven) {
         concave[edges] = test::edge_errors(probes, false);
         const std::string out = folder / (edges ? "with" : "without");
         write(context, made, out);
+        EXPECT_EQ(support::schema_complaint(support::slurp(out + "/plan.json"),
+                                            SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
+                  "");
         for (const Diagnostic& v : verify(context, out, stl, {}, 1).violations)
             ADD_FAILURE() << v.code << ' ' << v.message;
     }

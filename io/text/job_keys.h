@@ -444,6 +444,14 @@ void visit_edge_keys(CuttingLike& cutting, Visit& visit) {
               "degrees by which faces turn at a sharp edge, at least");
 }
 
+template <class CuttingLike, class Visit>
+void visit_boring_key(CuttingLike& cutting, Visit& visit) {
+    if (shows(visit, cutting.bore_holes))
+        visit.key("bore_holes", cutting.bore_holes,
+                  "upright round holes that no drill of the library makes are bored on a helix by a flat end "
+                  "mill");
+}
+
 /// Walks every key that any plan has: all of visit_job_keys but those of dowels.
 template <class JobLike, class Visit>
 void visit_plain_job_keys(JobLike& job, Visit& visit) {
@@ -550,6 +558,7 @@ void visit_plain_job_keys(JobLike& job, Visit& visit) {
     visit.key("arcs", job.cutting.arcs,
               "arcs (G2, G3) where a path turns evenly; false: straight moves only");
     visit_edge_keys(job.cutting, visit);
+    visit_boring_key(job.cutting, visit);
 
     visit.table(
         "selection",
