@@ -20,8 +20,10 @@ namespace {
 void print_errors(const char* words, const std::vector<test::EdgeProbe>& probes) {
     for (const bool convex : {true, false}) {
         const test::EdgeErrors e = test::edge_errors(probes, convex);
-        std::printf("  %-8s %-8s %7zu points, mean %.4f, 95 %% under %.4f, worst %.3f mm, over 1 mm %zu\n",
-                    words, convex ? "convex" : "concave", e.points, e.mean, e.p95, e.worst, e.beyond);
+        std::printf(
+            "  %-8s %-8s %7zu points, over .02 mm %zu, mean %.4f, 95 %% under %.4f, worst %.3f mm; "
+            "over 1 mm %zu\n",
+            words, convex ? "convex" : "concave", e.points, e.seen, e.mean, e.p95, e.worst, e.beyond);
     }
 }
 

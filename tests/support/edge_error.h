@@ -103,7 +103,8 @@ inline void cut_probes(const Plan& plan, std::vector<EdgeProbe>& probes) {
 
 /// Of the probes at which no more than a millimetre stands: more is what no tool of the plan reaches.
 struct EdgeErrors {
-    std::size_t points = 0, beyond = 0;
+    static constexpr double kSeen = 0.02;            ///< mm: as much as cutting.edges leaves alone
+    std::size_t points = 0, beyond = 0, seen = 0;    ///< seen: of the points, those over kSeen
     double mean = 0, p95 = 0, worst = 0, least = 0;  ///< mm along the normal
 };
 
@@ -119,6 +120,8 @@ inline EdgeErrors edge_errors(const std::vector<EdgeProbe>& probes, bool convex)
     if (errors.empty()) return all;
     std::sort(errors.begin(), errors.end());
     all.points = errors.size();
+    all.seen = static_cast<std::size_t>(
+        std::count_if(errors.begin(), errors.end(), [](double e) { return e > EdgeErrors::kSeen; }));
     for (const double e : errors) all.mean += e / static_cast<double>(errors.size());
     all.p95 = errors[errors.size() * 95 / 100];
     all.least = errors.front();
