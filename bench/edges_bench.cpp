@@ -21,9 +21,11 @@ void print_errors(const char* words, const std::vector<test::EdgeProbe>& probes)
     for (const bool convex : {true, false}) {
         const test::EdgeErrors e = test::edge_errors(probes, convex);
         std::printf(
-            "  %-8s %-8s %7zu points, over .02 mm %zu, mean %.4f, 95 %% under %.4f, worst %.3f mm; "
+            "  %-8s %-8s %7zu points, over .02 mm %zu, mean %.4f, 95 %% under %.4f, worst %.3f mm at %.2f "
+            "%.2f %.2f; "
             "over 1 mm %zu\n",
-            words, convex ? "convex" : "concave", e.points, e.seen, e.mean, e.p95, e.worst, e.beyond);
+            words, convex ? "convex" : "concave", e.points, e.seen, e.mean, e.p95, e.worst, e.worst_at[0],
+            e.worst_at[1], e.worst_at[2], e.beyond);
     }
 }
 

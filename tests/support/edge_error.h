@@ -106,6 +106,7 @@ struct EdgeErrors {
     static constexpr double kSeen = 0.02;            ///< mm: as much as cutting.edges leaves alone
     std::size_t points = 0, beyond = 0, seen = 0;    ///< seen: of the points, those over kSeen
     double mean = 0, p95 = 0, worst = 0, least = 0;  ///< mm along the normal
+    std::array<double, 3> worst_at{};                ///< mm
 };
 
 /// @param convex which edges
@@ -116,6 +117,10 @@ inline EdgeErrors edge_errors(const std::vector<EdgeProbe>& probes, bool convex)
         if (p.convex != convex) continue;
         if (p.error() > 1) ++all.beyond;
         else errors.push_back(p.error());
+        if (p.error() <= 1 && p.error() > all.worst) {
+            all.worst = p.error();
+            all.worst_at = {p.x, p.y, p.surface};
+        }
     }
     if (errors.empty()) return all;
     std::sort(errors.begin(), errors.end());

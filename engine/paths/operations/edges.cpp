@@ -97,16 +97,16 @@ std::vector<TipOffset> ball_offsets(const SharpEdge& edge, double radius) {
     return offsets;
 }
 
-// A flat or bull-nose end mill stands on the one face, its rim at the other, which is a wall.
+// A flat or bull-nose end mill has its rim at a wall: beside a convex edge at either, as low as the edge; on
+// a concave one it stands on the other face.
 std::vector<TipOffset> flat_offsets(const SharpEdge& edge, double radius) {
     std::vector<TipOffset> offsets;
-    if (edge.convex) return offsets;
     for (const Vec3d& n : edge.normals) {
         const double level = std::hypot(n[0], n[1]);
         if (n[2] > kWall || n[2] < kDown) continue;
         offsets.push_back({(radius + kClear) * n[0] / level, (radius + kClear) * n[1] / level, 0});
     }
-    if (offsets.size() > 1) offsets.clear();  // it has no floor
+    if (!edge.convex && offsets.size() > 1) offsets.clear();  // it has no floor
     return offsets;
 }
 
@@ -256,6 +256,8 @@ private:
     [[nodiscard]] std::optional<Operation> operation(std::size_t tool,
                                                      const std::vector<std::vector<EdgePlaces>>& places) {
         const EdgeTool& t = tools_[tool];
+        const double chord = safe_chord_mm(t.radius, cut_.job.tolerances.gouge);
+        const Slide slide{t.drops, t.ball, chord, cut_.layer.z_top, kNear, 0};
         std::vector<std::vector<PathPoint>> runs;
         double mm = 0;
         for (const std::vector<EdgePlaces>& edge : places)
@@ -264,7 +266,7 @@ private:
                 for (std::size_t k = 0; k <= edge.size(); ++k) {
                     const bool goes_on =
                         k < edge.size() && edge[k].tool == static_cast<int>(tool) && edge[k].is_there[side];
-                    if (goes_on) run.push_back(edge[k].at[side]);
+                    if (goes_on) append_free(run, edge[k].at[side], slide);
                     else if (!run.empty()) {
                         mm += along_ * static_cast<double>(run.size());
                         runs.push_back(simplify(run, simplify_tolerance_units(cut_.job.tolerances.gouge)));
@@ -277,8 +279,6 @@ private:
         PathBuilder path(op, *t.tool, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed),
                          cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
         path.set_surroundings(cut_.around(*t.tool, t.drops));
-        const double chord = safe_chord_mm(t.radius, cut_.job.tolerances.gouge);
-        const Slide slide{t.drops, t.ball, chord, cut_.layer.z_top, kNear, 0};
         follow_nearest(path, chained(std::move(runs), slide));
         if (!path.finish()) return std::nullopt;
         (void)stock_.cut(cut_.context, op, *t.tool);
