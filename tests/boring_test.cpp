@@ -45,6 +45,8 @@ Mesh plate_with_holes(Context& context) {
 Job job_with(bool bores) {
     Job job;
     job.tools = shop_library();
+    std::erase_if(job.tools,
+                  [](const Tool& tool) { return tool.diameter > 13 && tool.kind == ToolKind::flat; });
     job.cutting.bore_holes = bores;
     return job;
 }
