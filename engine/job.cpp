@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "kernels/errors.h"
 
@@ -246,6 +247,49 @@ double core_recess(const Tool& tool) {
 
 double clearing_step(const Tool& tool) {
     return std::min(tool.stepover * tool.diameter, 2 * clearing_radius(tool));
+}
+
+const CuttingData* cutting_data_of(const Material& material, const Tool& tool) {
+    const auto find = [&](std::span<const CuttingData> lines) {
+        const auto found = std::find_if(lines.begin(), lines.end(), [&](const CuttingData& data) {
+            return covers(data, tool.kind, tool.diameter, tool.flutes);
+        });
+        return found != lines.end() ? &*found : nullptr;
+    };
+    const CuttingData* const own = find(material.cutting);
+    return own != nullptr ? own : find(lines_of(material.chart));
+}
+
+Job with_cutting_data(const Job& job) {
+    Job fed = job;
+    const Machine& machine = job.machine;
+    for (Tool& tool : fed.tools) {
+        const CuttingData* const data = cutting_data_of(job.material, tool);
+        if (data != nullptr) {
+            if (data->spindle_rpm > 0) tool.max_rpm = std::min(tool.max_rpm, data->spindle_rpm);
+            if (data->surface_speed > 0)
+                tool.max_rpm =
+                    std::min(tool.max_rpm, std::max(machine.min_rpm, 1000 * data->surface_speed /
+                                                                         (std::numbers::pi * tool.diameter)));
+        }
+        if (std::isinf(tool.max_rpm)) tool.max_rpm = Tool{}.max_rpm;
+        if (data != nullptr) {
+            const double rpm = std::min(tool.max_rpm, machine.max_rpm);
+            tool.max_feed = std::min(tool.max_feed, std::max(1.0, data->chip_load * tool.flutes * rpm));
+            tool.plunge_feed = std::min(tool.plunge_feed, tool.max_feed);
+        }
+        if (std::isinf(tool.max_feed)) tool.max_feed = Tool{}.max_feed;
+    }
+    return fed;
+}
+
+void state_feeds(Job& job) {
+    const Job fed = with_cutting_data(job);
+    for (std::size_t i = 0; i < job.tools.size(); ++i) {
+        Tool& tool = job.tools[i];
+        if (std::isinf(tool.max_rpm)) tool.max_rpm = fed.tools[i].max_rpm;
+        if (std::isinf(tool.max_feed)) tool.max_feed = fed.tools[i].max_feed;
+    }
 }
 
 const Tool& tool_of_kind(const Job& job, ToolKind kind) {

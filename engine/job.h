@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/controls.h"
+#include "engine/cutting_data.h"
 #include "engine/keep_out.h"
 #include "engine/probing.h"
 #include "kernels/features/features.h"
@@ -61,7 +62,6 @@ enum class AccessRule : std::uint8_t { sections, exact, printed };
 /// The L from which the roughing stepdown follows (LUO 5.5.3.3): the finish tool's radius,
 /// tolerances.rough_cusp, or the smaller.
 enum class RoughLimit : std::uint8_t { smaller, finish_radius, cusp };
-enum class ToolKind : std::uint8_t { flat, ball, face, drill, bull_nose };
 /// Where x 0, y 0 of the programs lies: where the model has it, at the base board's corner of least x and y,
 /// in the base board's middle, or at a pin (Machine::pin).
 enum class WorkZero : std::uint8_t { model, corner, centre, pin };
@@ -108,7 +108,9 @@ struct Material {
            kfe = 2.4948;  ///< LUO 6.5.1: N/mm², N/mm, from orthogonal cutting
     std::string source = "Luo 6.5.1: orthogonal cutting of MDF (Dippon)";  ///< of these four, in words
     CoefficientTransform transform =
-        CoefficientTransform::oblique;  ///< how they become those of a helical edge
+        CoefficientTransform::oblique;        ///< how they become those of a helical edge
+    CuttingChart chart = CuttingChart::none;  ///< published feeds and speeds, where `cutting` has none
+    std::vector<CuttingData> cutting;         ///< feeds and speeds; the first that covers a tool is its own
 };
 
 struct Slabs {
@@ -159,6 +161,7 @@ struct Machine {
     double acceleration = 1000;                     ///< mm/s², of x
     double acceleration_y = 0, acceleration_z = 0;  ///< mm/s²; 0: as x
     double max_rpm = 18000;
+    double min_rpm = 0;            ///< that the spindle turns at least; 0: not stated
     double spindle_power_w = 0;    ///< that it has for cutting, at any speed; 0: no limit
     double spindle_torque_nm = 0;  ///< likewise
     double spindle_dwell_s = 3;
@@ -268,7 +271,10 @@ struct Cutting {
         true;  ///< feeds by chip load and deflection (engine/forces/feeds.h), where engagement is simulated
     bool adapt_stepdown =
         true;  ///< deep cuts in several passes where no feed will do (engine/forces/feeds.h), likewise
-    bool arcs = true;  ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
+    bool arcs = true;            ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
+    bool edges = false;          ///< sharp edges are followed where something stands beside them (FINISH 3.2)
+    bool bore_holes = false;     ///< upright round holes for which no drill is there are bored on a helix
+    double edge_angle_deg = 30;  ///< by which faces turn at least at an edge that counts as sharp
 };
 
 /// Choosing tools for a layer (engine/tools/select). With one flat and one ball end mill in the library there
@@ -454,6 +460,21 @@ struct Job {
 
 /// The first tool of a kind. @throws Error(usage, "job.tool") when the library has none
 [[nodiscard]] const Tool& tool_of_kind(const Job& job, ToolKind kind);
+
+/// The feeds and speeds that apply to a tool: the first of Material::cutting that covers it, else the first
+/// of the chart; null: none does.
+[[nodiscard]] const CuttingData* cutting_data_of(const Material& material, const Tool& tool);
+
+/// The job with its tools' feeds and speeds no higher than what the material's cutting data gives them:
+/// max_rpm by surface speed or spindle speed, no lower than the spindle turns; max_feed as chip load times
+/// flutes times the speed that the machine turns it at; plunge_feed no faster than that. What a tool does not
+/// state (an infinite max_rpm or max_feed) is that of a Tool by default where there is no data. Done twice it
+/// changes nothing more.
+[[nodiscard]] Job with_cutting_data(const Job& job);
+
+/// Gives tools what they do not state (an infinite max_rpm or max_feed), as with_cutting_data() has it. What
+/// they state stays as it is.
+void state_feeds(Job& job);
 
 /// Checks ranges and combinations. @throws Error(usage) that names the key
 void validate(const Job& job);

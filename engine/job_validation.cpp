@@ -171,6 +171,30 @@ void validate_handler(const Machine& c) {
                "give machine.handler_speed and machine.feed_height and a table that moves, or \"stack\"");
 }
 
+void validate_cutting(const Cutting& k) {
+    require("cutting.wall_allowance", k.wall_allowance, 0, 100);
+    require("cutting.floor_allowance", k.floor_allowance, 0, 100);
+    require("cutting.rough_blend", k.rough_blend, 0.02, 1);
+    require("cutting.steep_limit_deg", k.steep_limit_deg, 1, 89);
+    require("cutting.overlap_deg", k.overlap_deg, 0, 45);
+    require("cutting.vertical_deg", k.vertical_deg, 45, 90);
+    if (k.vertical_deg <= k.steep_limit_deg)
+        refuse("cutting.vertical_deg",
+               fmt::format("cutting.vertical_deg is {}, not over steep_limit_deg {}", k.vertical_deg,
+                           k.steep_limit_deg),
+               "vertical walls are steeper than steep ones");
+    require("cutting.min_stepdown", k.min_stepdown, 0.01, 100, Ends::closed, kFinerThanUseful);
+    require("cutting.min_stepover", k.min_stepover, 0.01, 100, Ends::closed, kFinerThanUseful);
+    require("cutting.min_flat_area", k.min_flat_area, 0, 1e6);
+    require("cutting.face_depth", k.face_depth, 0.05, 1000, Ends::closed, kFinerThanUseful);
+    require("cutting.ramp_deg", k.ramp_deg, 0.1, 90, Ends::closed,
+            "the way into the stock grows as it falls");
+    require("cutting.max_engagement", k.max_engagement, 0.01, 1, Ends::closed, kFinerThanUseful);
+    require("cutting.holder_clearance", k.holder_clearance, 0, 1000);
+    require("cutting.finish_feed", k.finish_feed, 1, 1e6);
+    require("cutting.edge_angle_deg", k.edge_angle_deg, 1, 179);
+}
+
 void validate_machine(const Machine& c, const Probing& probing) {
     require("machine.travel_x", c.travel_x, 1, 100000, Ends::closed, kNoRouter);
     require("machine.travel_y", c.travel_y, 1, 100000, Ends::closed, kNoRouter);
@@ -184,6 +208,7 @@ void validate_machine(const Machine& c, const Probing& probing) {
     validate_motion(c);
     validate_probing(probing);
     require("machine.max_rpm", c.max_rpm, 10, 1e6, Ends::closed, kNoRouter);
+    require("machine.min_rpm", c.min_rpm, 0, c.max_rpm);
     require("machine.spindle_power_w", c.spindle_power_w, 0, 1e6);
     require("machine.spindle_torque_nm", c.spindle_torque_nm, 0, 1e4);
     require("machine.spindle_dwell_s", c.spindle_dwell_s, 0, 600);
@@ -308,6 +333,7 @@ void validate(const Job& job) {
                            s.facing_allowance, s.thicknesses.front()),
                "face off less, or take that slab out of the list");
 
+    validate_cutting_data(job.material.cutting);
     validate_machine(job.machine, job.probing);
     validate_bonding(job.bonding);
     validate_prices(job.prices, s);
@@ -336,27 +362,7 @@ void validate(const Job& job) {
                            l.halving_coarse),
                "halving starts at the coarse spacing and ends at the resolution");
 
-    const Cutting& k = job.cutting;
-    require("cutting.wall_allowance", k.wall_allowance, 0, 100);
-    require("cutting.floor_allowance", k.floor_allowance, 0, 100);
-    require("cutting.rough_blend", k.rough_blend, 0.02, 1);
-    require("cutting.steep_limit_deg", k.steep_limit_deg, 1, 89);
-    require("cutting.overlap_deg", k.overlap_deg, 0, 45);
-    require("cutting.vertical_deg", k.vertical_deg, 45, 90);
-    if (k.vertical_deg <= k.steep_limit_deg)
-        refuse("cutting.vertical_deg",
-               fmt::format("cutting.vertical_deg is {}, not over steep_limit_deg {}", k.vertical_deg,
-                           k.steep_limit_deg),
-               "vertical walls are steeper than steep ones");
-    require("cutting.min_stepdown", k.min_stepdown, 0.01, 100, Ends::closed, kFinerThanUseful);
-    require("cutting.min_stepover", k.min_stepover, 0.01, 100, Ends::closed, kFinerThanUseful);
-    require("cutting.min_flat_area", k.min_flat_area, 0, 1e6);
-    require("cutting.face_depth", k.face_depth, 0.05, 1000, Ends::closed, kFinerThanUseful);
-    require("cutting.ramp_deg", k.ramp_deg, 0.1, 90, Ends::closed,
-            "the way into the stock grows as it falls");
-    require("cutting.max_engagement", k.max_engagement, 0.01, 1, Ends::closed, kFinerThanUseful);
-    require("cutting.holder_clearance", k.holder_clearance, 0, 1000);
-    require("cutting.finish_feed", k.finish_feed, 1, 1e6);
+    validate_cutting(job.cutting);
 
     const ToolSelection& select = job.selection;
     require("selection.threshold", select.threshold, 0, 1);

@@ -24,12 +24,13 @@ struct Flat {
     double z = 0, highest = 0;  ///< mm: its height, and that of its highest vertex
 };
 
-/// A vertical hole, as a layer's drill makes it.
+/// A vertical hole, as a layer's drill or end mill makes it.
 struct DrilledHole {
     double x = 0, y = 0;  ///< mm
     double top = 0;       ///< mm: what stands there once all else is cut
-    double tip = 0;       ///< mm: how low the drill's point goes
-    int tool = 0;         ///< Tool::number of the drill
+    double tip = 0;       ///< mm: how low the tool's tip goes
+    int tool = 0;         ///< Tool::number
+    double around = 0;    ///< mm: of the circle on which an end mill's middle goes down; 0: straight down
 };
 
 /// A layer's work is a value in and a value out.

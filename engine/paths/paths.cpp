@@ -9,6 +9,7 @@
 #include "engine/moves/arcs.h"
 #include "engine/moves/motion_time.h"
 #include "engine/paths/operations/drilling.h"
+#include "engine/paths/operations/edges.h"
 #include "engine/paths/operations/facing.h"
 #include "engine/paths/operations/floors.h"
 #include "engine/paths/operations/levels.h"
@@ -320,6 +321,8 @@ private:
         take(cut_rest(cut_, stock, tools_.finish, {OperationKind::finish, "what is left", limit, false}));
         reached(0.94);
         for (const Tool& tool : tools_.rest) cut_narrow(stock, tool, limit);
+        if (cut_.job.cutting.edges)
+            for (Operation& op : follow_edges(cut_, stock)) take(std::move(op));
         result_.left_mm2 = stock.area_over(context_, limit);
     }
     void cut_narrow(LayerStock& stock, const Tool& tool, double limit) {

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "engine/base_board.h"
+#include "engine/paths/operations/drilling.h"
 #include "engine/prepare/drilled_holes.h"
 #include "kernels/features/holes.h"
 #include "kernels/features/rounded_holes.h"
@@ -21,6 +24,7 @@ constexpr double kUpright = 0.99999848;  // cosine of .1°
 constexpr double kSame = 1e-3;           // mm: heights nearer than this are one
 constexpr double kGougeShare = 0.5;      // of the tolerance, for chords; roundings and the axis take the rest
 constexpr double kCuspShare = 0.9;
+constexpr double kHelixShare = 0.2;  // of the cusp, of which the chords of a helix take .15 (drill_holes)
 
 double point_length(const Tool& drill) {
     return drill.diameter / 2 / std::tan(cutter_shape(drill).taper_rad);
@@ -39,17 +43,19 @@ public:
         for (const RoundHole& found : find_holes(context_, mesh_)) {
             const RoundHole hole = narrowest_part(found).value_or(found);
             const Tool* const drill = nearest(hole);
-            if (drill == nullptr) continue;
+            if (drill == nullptr && !plan_.job.cutting.bore_holes) continue;
             const std::vector<std::vector<std::uint32_t>> around = rims_of(mesh_, hole);
-            const std::string reason = why_not(hole, *drill, around);
-            if (!reason.empty()) {
-                tell(hole, reason);
+            const std::string reason = drill != nullptr ? why_not(hole, *drill, around) : "no drill is there";
+            if (reason.empty()) {
+                drill_layers(hole, *drill);
+            } else if (!bored(hole, around)) {
+                if (drill != nullptr) tell(hole, reason);
                 continue;
             }
-            drill_layers(hole, *drill);
             for (const std::uint32_t f : hole.facets) gone[f] = 1;
             rims.insert(rims.end(), around.begin(), around.end());
         }
+        tell_bored();
         if (!rims.empty()) result_.closed = without(gone, rims);
         return std::move(result_);
     }
@@ -124,6 +130,58 @@ private:
         return "";
     }
 
+    // Whether the hole is bored.
+    bool bored(const RoundHole& hole, const std::vector<std::vector<std::uint32_t>>& rims) {
+        const bool is_open = hole.bottom == HoleBottom::open;
+        if (!plan_.job.cutting.bore_holes || hole.into[2] > -kUpright || hole.kind != HoleKind::plain ||
+            (!is_open && hole.bottom != HoleBottom::flat) || rims.size() != (is_open ? 2 : 1) ||
+            !std::all_of(rims.begin(), rims.end(), [&](const auto& rim) { return is_level(mesh_, rim); }) ||
+            (is_open && std::abs(bottom_of(hole)) > kSame))
+            return false;
+        const Tolerances& t = plan_.job.tolerances;
+        const double full = hole.diameter_mm / 2;
+        const double radius = std::min(full, full - hole.chord_mm + kGougeShare * t.gouge);
+        if (radius < full - (kCuspShare - kHelixShare) * t.cusp) return false;
+        const Tool* widest = nullptr;
+        for (const Tool& tool : plan_.job.tools)
+            if (can_bore(tool, 2 * radius) && reaches(hole, tool) &&
+                (widest == nullptr || tool.diameter > widest->diameter))
+                widest = &tool;
+        if (widest == nullptr) return false;
+        bore_layers(hole, *widest, radius - widest->diameter / 2);
+        ++bored_[{widest->number, std::lround(hole.diameter_mm * 1000)}];
+        return true;
+    }
+
+    [[nodiscard]] bool reaches(const RoundHole& hole, const Tool& tool) const {
+        const double reach = std::min(tool.flute_length, tool.stickout - plan_.job.cutting.holder_clearance);
+        return std::all_of(plan_.layers.begin(), plan_.layers.end(), [&](const Layer& layer) {
+            return !is_in(layer, hole) || layer.z_top - std::max(layer.z_bottom, bottom_of(hole)) <= reach;
+        });
+    }
+    [[nodiscard]] static bool is_in(const Layer& layer, const RoundHole& hole) {
+        return layer.z_top > bottom_of(hole) + kSame && layer.z_bottom < hole.mouth[2] - kSame;
+    }
+    void bore_layers(const RoundHole& hole, const Tool& tool, double around) {
+        for (std::size_t i = 0; i < plan_.layers.size(); ++i) {
+            const Layer& layer = plan_.layers[i];
+            if (is_in(layer, hole))
+                result_.layers[i].push_back({hole.mouth[0], hole.mouth[1],
+                                             std::min(hole.mouth[2], layer.z_top),
+                                             std::max(layer.z_bottom, bottom_of(hole)), tool.number, around});
+        }
+    }
+    void tell_bored() {
+        for (const auto& [what, count] : bored_)
+            result_.diagnostics.push_back(
+                {Severity::note,
+                 "hole.bored",
+                 fmt::format("{} hole{} of {:.3f} mm {} bored on a helix by tool {}", count,
+                             count == 1 ? "" : "s", static_cast<double>(what.second) / 1000,
+                             count == 1 ? "is" : "are", what.first),
+                 {}});
+    }
+
     // Of the full diameter.
     [[nodiscard]] static double bottom_of(const RoundHole& hole) {
         const HoleStep& wall = hole.steps.front();
@@ -139,7 +197,7 @@ private:
     void drill_layers(const RoundHole& hole, const Tool& drill) {
         for (std::size_t i = 0; i < plan_.layers.size(); ++i) {
             const Layer& layer = plan_.layers[i];
-            if (layer.z_top <= bottom_of(hole) + kSame || layer.z_bottom >= hole.mouth[2] - kSame) continue;
+            if (!is_in(layer, hole)) continue;
             result_.layers[i].push_back({hole.mouth[0], hole.mouth[1], std::min(hole.mouth[2], layer.z_top),
                                          tip_in(layer, hole, drill), drill.number});
         }
@@ -183,6 +241,7 @@ private:
     MeshView mesh_;
     const Plan& plan_;
     DrillPlan result_;
+    std::map<std::pair<int, long>, int> bored_;  // by tool and diameter, µm: how many
 };
 
 }  // namespace
@@ -190,7 +249,7 @@ private:
 DrillPlan plan_drilling(Context& context, MeshView pattern, const Plan& plan) {
     const bool has_drill = std::any_of(plan.job.tools.begin(), plan.job.tools.end(),
                                        [](const Tool& tool) { return tool.kind == ToolKind::drill; });
-    if (!has_drill) {
+    if (!has_drill && !plan.job.cutting.bore_holes) {
         DrillPlan none;
         none.layers.resize(plan.layers.size());
         return none;

@@ -24,8 +24,10 @@ struct DrillPlan {
 /// rim, plain ones and the narrowest part of those that widen towards the mouth (narrowest_part), through to
 /// the board or ending in the drill's own cone, whose circle lies within `gouge` of the drill's with the
 /// mesh's chords and within `cusp` from outside, as deep as flutes and stick-out reach from the layer's top.
-/// In every layer the full diameter goes down to the layer's bottom; the point dips into what is drilled
-/// below, or into the board as far as the job lets cutters cut it. All other holes are milled as before.
+/// With cutting.bore_holes, upright plain holes that no drill was meant for, through or with a flat bottom,
+/// are bored by the widest flat end mill that can (can_bore), as wide as the mesh's chords leave it. In every
+/// layer the full diameter goes down to the layer's bottom; the point dips into what is drilled below, or
+/// into the board as far as the job lets cutters cut it. All other holes are milled as before.
 /// @param plan its job and layers
 [[nodiscard]] DrillPlan plan_drilling(Context& context, MeshView pattern, const Plan& plan);
 

@@ -306,15 +306,46 @@ Plan plan_from(Context& context, MeshView view, Plan plan, const std::array<doub
     return plan_layers(context, view, plan, request, placement, {0.02, 0.985}, origin, &gaps);
 }
 
+// Where feeds and speeds come from, tool by tool; nothing where the job asks for no cutting data.
+void note_cutting_data(Plan& plan) {
+    const Job& job = plan.job;
+    if (job.material.cutting.empty() && job.material.chart == CuttingChart::none) return;
+    std::vector<int> without;
+    for (const Tool& tool : job.tools) {
+        const CuttingData* const data = cutting_data_of(job.material, tool);
+        if (data == nullptr) {
+            without.push_back(tool.number);
+            continue;
+        }
+        plan.diagnostics.push_back(
+            {Severity::note,
+             "feeds.cutting_data",
+             fmt::format("tool {}: at most {:.0f} turns and {:.0f} mm a minute, by {:.4g} mm a tooth ({})",
+                         tool.number, std::min(tool.max_rpm, job.machine.max_rpm),
+                         std::min(tool.max_feed, job.machine.max_feed), data->chip_load, data->source),
+             {}});
+    }
+    if (without.empty()) return;
+    plan.diagnostics.push_back(
+        {Severity::note,
+         "feeds.no_source",
+         fmt::format("tool{} {}: no cutting data is stated for such tools in {}, their own max_rpm and "
+                     "max_feed stand",
+                     without.size() == 1 ? "" : "s", fmt::join(without, ", "), job.material.name),
+         {}});
+}
+
 }  // namespace
 
-Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const Job& job) {
-    validate(job);
-    check_probing(job);
+Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const Job& asked) {
+    validate(asked);
+    check_probing(asked);
+    const Job job = with_cutting_data(asked);
     Plan plan;
     plan.input = input;
     plan.totals.part_volume_mm3 = input.volume_mm3;
     plan.job = job;
+    note_cutting_data(plan);
     if (mesh.facets.empty())
         throw refusal("input.empty", "there is nothing to make: the mesh has no facets", input.file,
                       "export the pattern again");

@@ -166,16 +166,17 @@ double changes_of(const Machine& machine) {
     return probed ? kChanges + 1 : kChanges;
 }
 
-void check_quotable(const Job& job) {
+Job quotable(const Job& job) {
     if (job.layers.sides != SlabSides::one)
         throw refusal("quote.sides", "slabs milled on both sides cannot be quoted yet", "layers.sides",
                       "plan the pattern, or quote it with layers.sides = \"one\"");
+    return with_cutting_data(job);
 }
 
 }  // namespace
 
-Quote quote(Context& context, MeshView mesh, const Job& job) {
-    check_quotable(job);
+Quote quote(Context& context, MeshView mesh, const Job& asked) {
+    const Job job = quotable(asked);
     Plan plan;
     plan.job = job;
     const Box3 box = bounds(context, mesh);

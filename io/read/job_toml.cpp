@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <tuple>
@@ -235,6 +236,10 @@ KeyNames all_keys() {
     names.prefix = "machine.keep_out.";
     const KeepOut none;
     visit_keep_out_keys(none, names);
+    names.names.emplace_back("material.cutting");
+    names.prefix = "material.cutting.";
+    const CuttingData line;
+    visit_cutting_data_keys(line, names);
     names.table("tool", "");
     visit_tool_keys(job.tools.front(), names);
     names.table("tools", "");
@@ -303,23 +308,40 @@ std::vector<const toml::table*> listed_tables(const toml::node* node, const std:
     return listed;
 }
 
-/// What [[machine.keep_out]] lists, in place of what the job had.
-void read_keep_outs(const toml::table& root, const std::string& file, const KeyNames& known,
-                    KeyReader& reader, std::vector<KeepOut>& keep_outs) {
-    const toml::node* const list = root["machine"]["keep_out"].node();
+/// What a list of tables within a table holds, [[machine.keep_out]], in place of what the job had.
+/// @param walk(entry, reader) takes the keys of one
+template <class Entry, class Walk>
+void read_entries(const toml::node* list, const std::string& name, const char* missing_remedy,
+                  const KeyNames& known, KeyReader& reader, std::vector<Entry>& entries, Walk&& walk) {
     if (list == nullptr) return;
-    keep_outs.clear();
-    KeyReader own(root, file);
-    own.set_missing_remedy("every [[machine.keep_out]] needs it: a name, a shape and a height");
-    for (const toml::table* const values : listed_tables(list, "machine.keep_out", reader, known)) {
-        own.enter(values, fmt::format("machine.keep_out[{}].", keep_outs.size() + 1));
-        visit_keep_out_keys(keep_outs.emplace_back(), own);
+    entries.clear();
+    KeyReader own = reader;
+    own.set_missing_remedy(missing_remedy);
+    for (const toml::table* const values : listed_tables(list, name, reader, known)) {
+        own.enter(values, fmt::format("{}[{}].", name, entries.size() + 1));
+        walk(entries.emplace_back(), own);
     }
     reader.learn_places(own);
 }
 
+void read_keep_outs(const toml::table& root, const KeyNames& known, KeyReader& reader, Machine& machine) {
+    read_entries(root["machine"]["keep_out"].node(), "machine.keep_out",
+                 "every [[machine.keep_out]] needs it: a name, a shape and a height", known, reader,
+                 machine.keep_outs, [](KeepOut& entry, KeyReader& own) { visit_keep_out_keys(entry, own); });
+}
+
+void read_cutting_data(const toml::table& root, const KeyNames& known, KeyReader& reader,
+                       Material& material) {
+    read_entries(root["material"]["cutting"].node(), "material.cutting",
+                 "every [[material.cutting]] needs it: a chip load and its source", known, reader,
+                 material.cutting,
+                 [](CuttingData& entry, KeyReader& own) { visit_cutting_data_keys(entry, own); });
+}
+
+/// Speed and feed that are left out are infinite until with_cutting_data().
 Tool tool_of(const toml::table& values, KeyReader& reader) {
     Tool tool;
+    tool.max_rpm = tool.max_feed = std::numeric_limits<double>::infinity();
     visit_tool_keys(tool, reader);
     if (values.get("plunges") == nullptr) tool.plunges = plunges_by_default(tool.kind);
     return tool;
@@ -547,7 +569,8 @@ Job parse_job(std::string_view text, const std::string& file, const Job& base, c
     refuse_unknown(root, "", known, reader);
     visit_job_keys(job, reader);
     take_post(job.machine, reader.post(), file, posts);
-    read_keep_outs(root, file, known, reader, job.machine.keep_outs);
+    read_keep_outs(root, known, reader, job.machine);
+    read_cutting_data(root, known, reader, job.material);
     const std::vector<const toml::table*> listed = listed_tables(root.get("tool"), "tool", reader, known);
     const toml::node* const shared = root.get("tools");
     if (shared != nullptr || !tools.library.empty()) {
@@ -559,6 +582,7 @@ Job parse_job(std::string_view text, const std::string& file, const Job& base, c
             job.tools.push_back(tool_of(*values, reader));
         }
     }
+    state_feeds(job);
     try {
         validate(job);
     } catch (const Error& error) {

@@ -94,10 +94,8 @@ Enum enumerator(const Word<Enum> (&words)[N], const Field& field) {
 
 OperationKind operation_kind(const Field& field) {
     const std::string text = field.text();
-    for (const OperationKind kind :
-         {OperationKind::face, OperationKind::rough, OperationKind::semi_rough, OperationKind::finish,
-          OperationKind::corner, OperationKind::drill, OperationKind::edge})
-        if (text == name(kind)) return kind;
+    for (int k = 0; k <= static_cast<int>(OperationKind::edge); ++k)
+        if (const auto kind = static_cast<OperationKind>(k); text == name(kind)) return kind;
     field.fail("says \"" + text + "\", which is no kind of operation");
 }
 
@@ -138,7 +136,6 @@ Tool read_tool(const Field& t) {
 class StatedKeys {
 public:
     bool own_post = false;  ///< machine.post is the folder's file
-
     explicit StatedKeys(const Field& job) : job_(job), table_(job) {}
     void table(const char* name, const char*) {
         stated_ = job_.has(name);
@@ -241,22 +238,22 @@ bool read_job(const Field& job, BuildPlan& build) {
     return keys.own_post;
 }
 
-/// The keep-outs that a plan states; a plan that states none has none.
-std::vector<KeepOut> read_keep_outs(const Field& plan) {
-    std::vector<KeepOut> keep_outs;
-    if (!plan.has("keep_outs")) return keep_outs;
-    const Field all = plan["keep_outs"];
-    for (std::size_t i = 0; i < all.size(); ++i) {
-        const Field stated = all[i];
+/// A list that a plan may state. @param check throws Error where its entries are none
+template <class Entry, class Walk>
+std::vector<Entry> stated_list(const Field& plan, const char* name, void (*check)(const std::vector<Entry>&),
+                               Walk&& walk) {
+    std::vector<Entry> entries;
+    for (std::size_t i = 0; plan.has(name) && i < plan[name].size(); ++i) {
+        const Field stated = plan[name][i];
         StatedKeys keys(stated);
-        visit_keep_out_keys(keep_outs.emplace_back(), keys);
+        walk(entries.emplace_back(), keys);
     }
     try {
-        validate_keep_outs(keep_outs);
+        check(entries);
     } catch (const Error& error) {
-        all.fail("are none: " + error.message());
+        plan[name].fail("are none: " + error.message());
     }
-    return keep_outs;
+    return entries;
 }
 
 /// How the pattern was read: as the job says, placed by the very numbers that the plan states.
@@ -535,7 +532,10 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
     if (plan.has("job") && read_job(plan["job"], build)) read_post(plan, out, refusal, build.job.machine);
     if (build.frame == Frame::table_top && !build.job_stated)
         plan["frame"].fail("counts from the machine's table, and no job says how thick the base board is");
-    build.job.machine.keep_outs = read_keep_outs(plan);
+    build.job.machine.keep_outs = stated_list(plan, "keep_outs", &validate_keep_outs,
+                                              [](auto& k, auto& keys) { visit_keep_out_keys(k, keys); });
+    build.job.material.cutting = stated_list(plan, "cutting_data", &validate_cutting_data,
+                                             [](auto& d, auto& keys) { visit_cutting_data_keys(d, keys); });
     build.pattern = plan["input"]["file"].text();
     build.sha256 = plan["input"]["sha256"].text();
     folder.pattern = {build.pattern, build.sha256, read_reading(plan["input"], build), read_supports(plan)};

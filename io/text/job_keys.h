@@ -92,6 +92,19 @@ inline constexpr Word<ToolKind> kToolWords[] = {{"flat", ToolKind::flat},
                                                 {"drill", ToolKind::drill},
                                                 {"bull-nose", ToolKind::bull_nose}};
 
+inline constexpr Word<CuttingScope> kCuttingScopeWords[] = {{"any", CuttingScope::any},
+                                                            {"end-mill", CuttingScope::end_mill},
+                                                            {"flat", CuttingScope::flat},
+                                                            {"ball", CuttingScope::ball},
+                                                            {"face", CuttingScope::face},
+                                                            {"drill", CuttingScope::drill},
+                                                            {"bull-nose", CuttingScope::bull_nose}};
+inline constexpr Word<CuttingChart> kChartWords[] = {{"none", CuttingChart::none},
+                                                     {"mdf", CuttingChart::mdf},
+                                                     {"pine", CuttingChart::pine},
+                                                     {"plywood", CuttingChart::plywood},
+                                                     {"foam", CuttingChart::foam}};
+
 inline constexpr Word<KeepOutBase> kKeepOutWords[] = {{"board", KeepOutBase::board},
                                                       {"slab", KeepOutBase::slab}};
 inline constexpr Word<MirrorAxis> kMirrorWords[] = {
@@ -160,6 +173,22 @@ void visit_keep_out_keys(KeepOutLike& keep_out, Visit& visit) {
     visit.word("from", keep_out.from, kKeepOutWords,
                "its base: board (the base board's top) or slab (the top of the layer's slab before facing)");
     visit.key("clearance", keep_out.clearance, "mm that tools keep away from it");
+}
+
+/// Walks the keys of one line of cutting data.
+template <class DataLike, class Visit>
+void visit_cutting_data_keys(DataLike& data, Visit& visit) {
+    visit.word("kind", data.kind, kCuttingScopeWords,
+               "of tools: any, end-mill, flat, ball, face, drill or bull-nose");
+    visit.key("diameter_min", data.diameter_min, "mm");
+    visit.key("diameter_max", data.diameter_max, "mm; 0: any");
+    visit.key("flutes", data.flutes, "cutting edges; 0: any number");
+    visit.required();
+    visit.key("chip_load", data.chip_load, "mm a tooth");
+    visit.key("surface_speed", data.surface_speed, "m/min at the rim; 0: not stated");
+    visit.key("spindle_rpm", data.spindle_rpm, "turns a minute, at which it is stated; 0: not stated");
+    visit.required();
+    visit.key("source", data.source, "whose figures these are");
 }
 
 /// Walks the keys of what is done to the model before it is planned.
@@ -231,6 +260,8 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
     visit_handler_keys(machine, visit);
     visit_motion_keys(machine, visit);
     visit.key("max_rpm", machine.max_rpm, "turns a minute");
+    if (shows(visit, machine.min_rpm > 0))
+        visit.key("min_rpm", machine.min_rpm, "turns a minute, the spindle's slowest; 0: not stated");
     visit.key("spindle_power_w", machine.spindle_power_w,
               "W that the spindle has for cutting, kept by feed and stepdown; 0: no limit");
     visit.key("spindle_torque_nm", machine.spindle_torque_nm, "Nm, likewise");
@@ -378,6 +409,49 @@ void visit_sides_key(LayersLike& layers, Visit& visit) {
                    "turned and laid; auto: two where that makes more");
 }
 
+/// Walks the keys of what the slabs are made of.
+template <class MaterialLike, class Visit>
+void visit_material_keys(MaterialLike& material, Visit& visit) {
+    visit.table("material", "what the slabs are made of");
+    visit.key("name", material.name, "");
+    visit.key("strength_mpa", material.strength_mpa, "MPa");
+    visit.key("min_thickness", material.min_thickness,
+              "mm, MTmin: thinnest material above a layer boundary; 0: what bears the cutters where the slab "
+              "hangs over (Luo 6.3)");
+    visit.key("shallow_limit_deg", material.shallow_limit_deg,
+              "degrees from horizontal: shallower slopes are features (Type III)");
+    visit.key("density_kg_m3", material.density_kg_m3, "kg/m^3");
+    visit.key("ktc", material.ktc, "N/mm^2, cutting coefficient along the cut (LUO 6.5.1)");
+    visit.key("kte", material.kte, "N/mm, edge coefficient along the cut");
+    visit.key("kfc", material.kfc, "N/mm^2, cutting coefficient across the cut");
+    visit.key("kfe", material.kfe, "N/mm, edge coefficient across the cut");
+    visit.key("source", material.source, "where these four come from: orthogonal cutting of this material");
+    visit.word("transform", material.transform, kTransformWords,
+               "of the four to a helical edge: oblique, or printed (Luo 6.2.2, whose matrix repeats a row)");
+    if (shows(visit, material.chart != CuttingChart::none))
+        visit.word("chart", material.chart, kChartWords,
+                   "published chip loads: mdf, pine, plywood or foam (Amana, AST); none; no chart of tooling "
+                   "boards is known, state [[material.cutting]] for them");
+}
+
+/// Walks the keys of edges that are followed.
+template <class CuttingLike, class Visit>
+void visit_edge_keys(CuttingLike& cutting, Visit& visit) {
+    if (!shows(visit, cutting.edges)) return;
+    visit.key("edges", cutting.edges,
+              "follow sharp edges where something stands beside them, both sides of convex ones");
+    visit.key("edge_angle_deg", cutting.edge_angle_deg,
+              "degrees by which faces turn at a sharp edge, at least");
+}
+
+template <class CuttingLike, class Visit>
+void visit_boring_key(CuttingLike& cutting, Visit& visit) {
+    if (shows(visit, cutting.bore_holes))
+        visit.key("bore_holes", cutting.bore_holes,
+                  "upright round holes that no drill of the library makes are bored on a helix by a flat end "
+                  "mill");
+}
+
 /// Walks every key that any plan has: all of visit_job_keys but those of dowels.
 template <class JobLike, class Visit>
 void visit_plain_job_keys(JobLike& job, Visit& visit) {
@@ -389,24 +463,7 @@ void visit_plain_job_keys(JobLike& job, Visit& visit) {
         "repair", job.input.repair, kRepairWords,
         "of a mesh that is no solid: none (it is refused), mend, or rebuild where mending does not close it");
 
-    visit.table("material", "what the slabs are made of");
-    visit.key("name", job.material.name, "");
-    visit.key("strength_mpa", job.material.strength_mpa, "MPa");
-    visit.key("min_thickness", job.material.min_thickness,
-              "mm, MTmin: thinnest material above a layer boundary; 0: what bears the cutters where the slab "
-              "hangs over (Luo 6.3)");
-    visit.key("shallow_limit_deg", job.material.shallow_limit_deg,
-              "degrees from horizontal: shallower slopes are features (Type III)");
-    visit.key("density_kg_m3", job.material.density_kg_m3, "kg/m^3");
-    visit.key("ktc", job.material.ktc, "N/mm^2, cutting coefficient along the cut (LUO 6.5.1)");
-    visit.key("kte", job.material.kte, "N/mm, edge coefficient along the cut");
-    visit.key("kfc", job.material.kfc, "N/mm^2, cutting coefficient across the cut");
-    visit.key("kfe", job.material.kfe, "N/mm, edge coefficient across the cut");
-    visit.key("source", job.material.source,
-              "where these four come from: orthogonal cutting of this material");
-    visit.word("transform", job.material.transform, kTransformWords,
-               "of the four to a helical edge: oblique, or printed (Luo 6.2.2, whose matrix repeats a row)");
-
+    visit_material_keys(job.material, visit);
     visit_slab_keys(job.slabs, visit);
     visit_machine_and_probing_keys(job, visit);
 
@@ -500,6 +557,8 @@ void visit_plain_job_keys(JobLike& job, Visit& visit) {
               "simulated engagement");
     visit.key("arcs", job.cutting.arcs,
               "arcs (G2, G3) where a path turns evenly; false: straight moves only");
+    visit_edge_keys(job.cutting, visit);
+    visit_boring_key(job.cutting, visit);
 
     visit.table(
         "selection",

@@ -94,6 +94,14 @@ std::string job_toml(const Job& job) {
         printer.text += "\n[[machine.keep_out]]\n";
         visit_keep_out_keys(keep_out, printer);
     }
+    printer.text +=
+        "\n# Feeds and speeds of tools in this material: any number of [[material.cutting]], each with "
+        "chip_load\n# and source. Tools that leave out max_rpm and max_feed take them from here, or from "
+        "material.chart.\n";
+    for (const CuttingData& data : job.material.cutting) {
+        printer.text += "\n[[material.cutting]]\n";
+        visit_cutting_data_keys(data, printer);
+    }
     printer.text += "\n# The tool library. Any [[tool]] replaces the whole default library.\n";
     for (const Tool& tool : job.tools) {
         printer.text += "\n[[tool]]\n";

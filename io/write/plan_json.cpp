@@ -122,6 +122,19 @@ void put_keep_outs(JsonText& json, const std::vector<KeepOut>& keep_outs) {
     json.end();
 }
 
+/// The job's own lines of cutting data; nothing where it has none.
+void put_cutting_data(JsonText& json, const std::vector<CuttingData>& lines) {
+    if (lines.empty()) return;
+    json.key("cutting_data").begin_array();
+    for (const CuttingData& data : lines) {
+        json.begin_object(Shape::line);
+        JobPrinter keys{json};
+        visit_cutting_data_keys(data, keys);
+        json.end();
+    }
+    json.end();
+}
+
 void put_place(JsonText& json, const std::optional<std::array<double, 3>>& place) {
     if (!place) {
         json.null();
@@ -501,6 +514,7 @@ std::string plan_json(const Plan& plan) {
     }
     json.end();
     put_keep_outs(json, plan.job.machine.keep_outs);
+    put_cutting_data(json, plan.job.material.cutting);
     json.key("tools").begin_array();
     for (const Tool& tool : plan.job.tools) put_tool(json, plan, tool);
     json.end();

@@ -18,7 +18,8 @@ constexpr double kRounding = 0.01;  // degrees, of a file's coordinates
 constexpr double kDegrees = 180 / std::numbers::pi;
 
 struct MeshEdge {
-    std::uint32_t a = 0, b = 0;  // vertices
+    std::uint32_t a = 0, b = 0;             // vertices
+    std::array<std::uint32_t, 2> facets{};  // beside it
     double turn_deg = 0;
     bool convex = false;
 };
@@ -37,7 +38,8 @@ std::vector<MeshEdge> edges_over(Context& context, MeshView mesh, double least_d
                     const Bend bend = bends.at({f, k});
                     const double turn = std::abs(bend.rad) * kDegrees;
                     if (!bend.is_sure || turn < least_deg - kRounding) continue;
-                    found.push_back({mesh.facets[f][k], mesh.facets[f][(k + 1) % 3], turn, bend.rad < 0});
+                    found.push_back(
+                        {mesh.facets[f][k], mesh.facets[f][(k + 1) % 3], {f, g}, turn, bend.rad < 0});
                 }
             return found;
         },
@@ -92,6 +94,7 @@ EdgeChain chain_of(MeshView mesh, const std::vector<MeshEdge>& edges, const Edge
         used[at] = 1;
         const Point3 p = to_double(mesh.vertices[e.a]), q = to_double(mesh.vertices[e.b]);
         chain.length_mm += length(minus(q, p));
+        chain.sides.push_back(e.facets);
         if (e.turn_deg > chain.sharpest_deg) chain.sharpest_deg = e.turn_deg, chain.at = between(p, q, 0.5);
         vertex = far_end(e, vertex);
         if (vertex == chain.vertices.front()) {

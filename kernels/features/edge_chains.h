@@ -1,6 +1,7 @@
 // Sharp edges of a mesh, joined to chains (FINISH 3.2; METHOD.md section 3).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -16,6 +17,7 @@ struct EdgeChain {
     bool convex = false;                  ///< the solid is on the inside of the bend
     bool closed = false;                  ///< its end meets its beginning
     std::vector<std::uint32_t> vertices;  ///< in their order; of a closed one the first is not repeated
+    std::vector<std::array<std::uint32_t, 2>> sides;  ///< of each edge in turn: the facets beside it
     double length_mm = 0;
     double sharpest_deg = 0;  ///< the most by which faces turn at it; 90 at a cube's edge
     Point3 at{};              ///< the middle of that edge

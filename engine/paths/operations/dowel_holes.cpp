@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "engine/moves/path_builder.h"
@@ -15,54 +14,11 @@ namespace slabwright {
 
 namespace {
 
-constexpr int kChords = 32;              // of a turn: they lie within .5 % of its radius
-constexpr double kOverCore = 1.02;       // of a core's diameter: by so much a hole is wider than its end mill
-constexpr double kLeastClearance = 0.1;  // mm, the same of one without a core
+constexpr double kChords = 0.0048;  // of a turn's radius, within which its chords lie
 
 bool reaches(const Job& job, const Tool& tool, double depth) {
     const double deep = depth + point_below(tool);
     return tool.flute_length >= deep && tool.stickout - job.cutting.holder_clearance >= deep;
-}
-
-bool can_bore(const Tool& tool, double hole) {
-    const double wider = hole - tool.diameter;
-    return tool.kind == ToolKind::flat && tool.diameter >= hole / 2 && wider >= kLeastClearance &&
-           wider >= kOverCore * core_diameter_of(tool);
-}
-
-std::vector<PathPoint> turn(Point2 middle, double radius, std::int32_t z) {
-    std::vector<PathPoint> ring;
-    for (int k = 0; k <= kChords; ++k) {
-        const double angle = 2 * std::numbers::pi * (k % kChords) / kChords;
-        ring.push_back({middle.x + to_units(radius * std::cos(angle)),
-                        middle.y + to_units(radius * std::sin(angle)), z});
-    }
-    return ring;
-}
-
-/// Down on a helix, a level turn at the bottom, out in the middle.
-void bore(PathBuilder& path, Operation& op, const Tool& tool, const DrilledHole& hole, double radius) {
-    const Point2 middle{to_units(hole.x), to_units(hole.y)};
-    const std::vector<PathPoint> ring = turn(middle, radius, 0);
-    const double around = 2 * std::numbers::pi * radius,
-                 pitch = std::min(tool.stepdown_max, path.slope_around(ring) * around),
-                 deep = hole.top - hole.tip;
-    const int turns = std::max(1, static_cast<int>(std::ceil(deep / pitch - 1e-9)));
-    op.stepdown = std::max(op.stepdown, deep / turns);
-    const Point2 begin{ring.front().x, ring.front().y};
-    path.go_above(begin);
-    path.sink(to_units(hole.top + kAirOverHole));
-    path.plunge(to_units(hole.top));
-    for (int k = 1; k <= turns * kChords; ++k) {
-        const PathPoint& at = ring[static_cast<std::size_t>(k % kChords)];
-        path.cut({at.x, at.y}, to_units(hole.top - deep * k / (turns * kChords)));
-    }
-    for (int k = 1; k <= kChords; ++k) {
-        const PathPoint& at = ring[static_cast<std::size_t>(k % kChords)];
-        path.cut({at.x, at.y}, to_units(hole.tip));
-    }
-    path.cut(middle, to_units(hole.tip));
-    path.retract();
 }
 
 }  // namespace
@@ -97,11 +53,12 @@ Operation dowel_holes(const Job& job, const Layer& layer, const Tool& tool) {
                      layer.z_top + job.machine.clearance, layer.z_top + kLinkOverHoles);
     std::vector<DrilledHole> holes;
     for (const JointDowel& dowel : layer.dowels)
-        holes.push_back(
-            {dowel.x, dowel.y, layer.z_top, layer.z_top - dowel.below - point_below(tool), tool.number});
+        holes.push_back({dowel.x, dowel.y, layer.z_top, layer.z_top - dowel.below - point_below(tool),
+                         tool.number,
+                         tool.kind == ToolKind::drill ? 0 : (job.dowels.diameter - tool.diameter) / 2});
     for (const DrilledHole& hole : in_order(std::move(holes)))
         if (tool.kind == ToolKind::drill) peck(path, op, tool, hole);
-        else bore(path, op, tool, hole, (job.dowels.diameter - tool.diameter) / 2);
+        else bore(path, op, tool, hole, kChords * hole.around);
     if (!path.finish()) op.moves.clear();
     return op;
 }
