@@ -26,27 +26,30 @@ constexpr double kBeside = 0.05;  // mm from a layer's ends to where it is cut b
 constexpr double kUpright = 89.5, kLevel = 0.5, kSteep = 45;  // degrees
 
 /// What milling takes over its ways at full feed, and minutes of a place in a layer: fitted to the programs
-/// of castings (bench/quote), least squares of relative errors, those over a quarter weighing less.
-/// Walls and floors are small beside these and go with the places.
+/// of castings and of a pool (bench/quote --fit), least squares of relative errors, those over a quarter
+/// weighing less. Walls and floors are small beside these and go with the places.
 struct Rates {
-    double facing = 3.745, roughing = 0.571, contours = 2.056, raster = 3.084;
-    double place = 3.359;   // min
-    double turn = 0.03389;  // min a radian: machines slow down where an outline turns
-    double thin = 48.22;    // min/min: where wood is thin, feeds are low and passes many
+    double facing = 2.433, roughing = 0.710, contours = 2.767, raster = 3.899;
+    double narrow =
+        27.46;            // narrow air is roughed by the end mill and again by the finishing tool, and slowly
+    double thin = 35.65;  // thin walls are spared by feed and by passes
+    double place = 2.585;   // min
+    double turn = 0.03091;  // min a radian: machines slow down where an outline turns
 };
 constexpr Rates kRates{};
 constexpr double kSmallPlace = 150;  // mm: a loop so long counts as half a place
 constexpr double kSeenTurn = 0.03;   // mm from a loop's chords, within which it may turn
 constexpr double kChanges = 3.2;     // of tools in a layer
-constexpr double kThin = 8;          // mm: of a section's mean half width at which it counts a third as thin
-constexpr double kLeastArea = 1e-3;  // mm²
+constexpr double kThin = 8;          // mm: walls that are thinner count
+constexpr double kSeenWidth = 0.05;  // mm, to which widths of wood and air are measured
 
 /// Ways of one kind in all layers, mm.
 struct Ways {
     double facing = 0, roughing = 0, contours = 0, raster = 0;
     double places = 0;  ///< loops of sections, small ones by their length
     double turns = 0;   ///< rad by which outlines turn back, over all levels
-    double thin = 0;    ///< mm around thin wood, over all levels
+    double thin = 0;    ///< mm along walls thinner than kThin, over all levels
+    double narrow = 0;  ///< mm of roughing where the face mill does not fit
 };
 
 const Tool& face_mill(const Job& job) {
@@ -54,6 +57,9 @@ const Tool& face_mill(const Job& job) {
         if (tool.kind == ToolKind::face) return tool;
     throw Error(ErrorKind::usage, "job.tool", "the library has no face mill", "tool", "give one");
 }
+
+/// mm³ that a tool takes away over a millimetre of clearing.
+double swath(const Tool& tool) { return tool.diameter * tool.stepover * tool.stepdown_max; }
 
 double perimeter(std::span<const Point2> loop) {
     double sum = 0;
@@ -77,19 +83,30 @@ double turning_back(std::span<const Point2> loop) {
     return std::max(0.0, (sum - 2 * std::numbers::pi) / 2);
 }
 
-/// What the outlines of one section count for. @param levels that are cut about it
-void add_outlines(const Loops& solid, double levels, Ways& ways) {
-    double around = 0;
+/// mm² of wood where no circle of this diameter fits: walls that are thinner, and sharp outer corners.
+double thin_area(const Loops& solid, double diameter) {
+    const Loops thick = offset(offset(solid, -diameter / 2, kSeenWidth), diameter / 2, kSeenWidth);
+    return std::max(0.0, area(solid) - area(thick));
+}
+
+/// mm² of air where no circle of this diameter fits, between walls and in inner corners.
+double narrow_area(const Loops& solid, double diameter) {
+    const Loops filled = offset(offset(solid, diameter / 2, kSeenWidth), -diameter / 2, kSeenWidth);
+    return std::max(0.0, area(filled) - area(solid));
+}
+
+/// What one section counts for. @param height mm, of the part of a layer that it stands for
+void add_section(const Loops& solid, double height, const LayerTools& tools, const Tool& face, Ways& ways) {
     for (std::size_t i = 0; i < solid.size(); ++i) {
         const double length = perimeter(solid.loop(i));
-        around += length;
         ways.places += length / (length + kSmallPlace) / 3;
     }
+    const double levels = height / tools.finish.stepdown_max;
     const Loops coarse = thinned(solid, kSeenTurn);
     for (std::size_t i = 0; i < coarse.size(); ++i) ways.turns += levels * turning_back(coarse.loop(i));
-    if (!(around > 0)) return;
-    const double half_width = 2 * std::max(area(solid), kLeastArea) / around;
-    ways.thin += levels * around * std::exp(-half_width / kThin);
+    const Loops seen = thinned(solid, kSeenWidth);
+    ways.thin += levels * thin_area(seen, kThin) / kThin;
+    ways.narrow += height * narrow_area(seen, face.diameter) / swath(tools.rough);
 }
 
 /// Layers with the slabs that they are milled from, of the stocked thicknesses.
@@ -216,14 +233,13 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
             const Loops solid = simplify(sections[3 * l + k].loops);
             area_at[k] = area(solid);
             if (k < 2) area_at[k] = std::max(area_at[k], area_at[k + 1]);  // what is under it stays filled
-            add_outlines(solid, height / tools.finish.stepdown_max / 3, ways);
+            add_section(solid, height / 3, tools, face, ways);
         }
         const double solid_mm3 = (area_at[0] + 4 * area_at[1] + area_at[2]) / 6 * height;
         const double takes = slab * together - height;
         ways.facing += std::ceil(std::max(takes, 1e-3) / face.stepdown_max) * stock_mm2 /
                        (face.diameter * face.stepover);
-        ways.roughing += std::max(0.0, stock_mm2 * height - solid_mm3) /
-                         (tools.rough.diameter * tools.rough.stepover * tools.rough.stepdown_max);
+        ways.roughing += std::max(0.0, stock_mm2 * height - solid_mm3) / swath(tools.rough);
         const double below = l == 0 ? area_at[0] : area(simplify(sections[3 * l - 1].loops));
         const double glued = std::min(area_at[0], below);
         result.glue_m2 += glued * 1e-6;
@@ -242,7 +258,8 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
     work("roughing", ways.roughing, tools.rough, kRates.roughing);
     work("contours", ways.contours, tools.finish, kRates.contours);
     work("raster", ways.raster, tools.finish, kRates.raster);
-    work("thin wood", ways.thin, tools.finish, kRates.thin);
+    work("thin walls", ways.thin, tools.finish, kRates.thin);
+    work("narrow places", ways.narrow, tools.rough, kRates.narrow);
     result.work.push_back({"places", ways.places, kRates.place * ways.places});
     result.work.push_back({"turns", 0, kRates.turn * ways.turns});
     for (const QuotedWork& w : result.work) result.cutting_minutes += w.minutes;
