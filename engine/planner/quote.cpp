@@ -95,8 +95,16 @@ double narrow_area(const Loops& solid, double diameter) {
     return std::max(0.0, area(filled) - area(solid));
 }
 
-/// What one section counts for. @param height mm, of the part of a layer that it stands for
-void add_section(const Loops& solid, double height, const LayerTools& tools, const Tool& face, Ways& ways) {
+/// What one section counts for.
+struct SectionCount {
+    double mm2 = 0;
+    double places = 0, turns = 0, thin = 0, narrow = 0;  ///< of Ways
+};
+
+/// @param height mm, of the part of a layer that it stands for
+SectionCount count_section(const Loops& section, double height, const LayerTools& tools, const Tool& face) {
+    const Loops solid = simplify(section);
+    SectionCount ways{.mm2 = area(solid)};
     for (std::size_t i = 0; i < solid.size(); ++i) {
         const double length = perimeter(solid.loop(i));
         ways.places += length / (length + kSmallPlace) / 3;
@@ -105,8 +113,9 @@ void add_section(const Loops& solid, double height, const LayerTools& tools, con
     const Loops coarse = thinned(solid, kSeenTurn);
     for (std::size_t i = 0; i < coarse.size(); ++i) ways.turns += levels * turning_back(coarse.loop(i));
     const Loops seen = thinned(solid, kSeenWidth);
-    ways.thin += levels * thin_area(seen, kThin) / kThin;
-    ways.narrow += height * narrow_area(seen, face.diameter) / swath(tools.rough);
+    ways.thin = levels * thin_area(seen, kThin) / kThin;
+    ways.narrow = height * narrow_area(seen, face.diameter) / swath(tools.rough);
+    return ways;
 }
 
 /// Layers with the slabs that they are milled from, of the stocked thicknesses.
@@ -170,6 +179,29 @@ void add_surface(Context& context, MeshView mesh, const Job& job, const LayerToo
     ways.raster += sum.raster;
 }
 
+/// Of three sections in each layer, from below: near its bottom, in the middle, near its top.
+/// @param tops of the plan's layers, mm
+std::vector<SectionCount> count_sections(Context& context, MeshView mesh, const Plan& plan,
+                                         const std::vector<double>& tops, const LayerTools& tools,
+                                         const Tool& face) {
+    std::vector<Plane> planes;
+    double bottom = 0;
+    for (const double top : tops) {
+        const double beside = std::min(kBeside, (top - bottom) / 4);
+        planes.push_back({bottom + beside, Side::above});
+        planes.push_back({(bottom + top) / 2, Side::above});
+        planes.push_back({top - beside, Side::above});
+        bottom = top;
+    }
+    const std::vector<Section> sections = slice(context, mesh, planes);
+    std::vector<SectionCount> counts(sections.size());
+    parallel_each(context, sections.size(), [&](std::size_t i) {
+        const Layer& layer = plan.layers[i / 3];
+        counts[i] = count_section(sections[i].loops, (layer.z_top - layer.z_bottom) / 3, tools, face);
+    });
+    return counts;
+}
+
 /// Of a layer's slabs. @param glued mm² of the joint under it; those between its slabs are glued all over
 double bonding_minutes(const Job& job, const Box3& box, double glued, const Blank& slab, int slabs) {
     return (bonding_seconds(job, glued, double{box.max.x} - box.min.x) +
@@ -207,17 +239,14 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
     saw_blanks(context, mesh, plan);
     result.boards = cut_list(plan);
 
-    std::vector<Plane> planes;
-    double bottom = 0;
-    for (const double top : layers.tops) {
-        const double beside = std::min(kBeside, (top - bottom) / 4);
-        planes.push_back({bottom + beside, Side::above});
-        planes.push_back({(bottom + top) / 2, Side::above});
-        planes.push_back({top - beside, Side::above});
-        bottom = top;
-    }
-    const std::vector<Section> sections = slice(context, mesh, planes);
+    const std::vector<SectionCount> counts = count_sections(context, mesh, plan, layers.tops, tools, face);
     Ways ways;
+    for (const SectionCount& count : counts) {
+        ways.places += count.places;
+        ways.turns += count.turns;
+        ways.thin += count.thin;
+        ways.narrow += count.narrow;
+    }
     std::map<double, int> slabs;
     double stack_mm3 = 0;
     for (std::size_t l = 0; l < layers.tops.size(); ++l) {
@@ -230,17 +259,15 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
         stack_mm3 += stock_mm2 * slab * together;
         std::array<double, 3> area_at{};
         for (std::size_t k = 3; k-- > 0;) {
-            const Loops solid = simplify(sections[3 * l + k].loops);
-            area_at[k] = area(solid);
+            area_at[k] = counts[3 * l + k].mm2;
             if (k < 2) area_at[k] = std::max(area_at[k], area_at[k + 1]);  // what is under it stays filled
-            add_section(solid, height / 3, tools, face, ways);
         }
         const double solid_mm3 = (area_at[0] + 4 * area_at[1] + area_at[2]) / 6 * height;
         const double takes = slab * together - height;
         ways.facing += std::ceil(std::max(takes, 1e-3) / face.stepdown_max) * stock_mm2 /
                        (face.diameter * face.stepover);
         ways.roughing += std::max(0.0, stock_mm2 * height - solid_mm3) / swath(tools.rough);
-        const double below = l == 0 ? area_at[0] : area(simplify(sections[3 * l - 1].loops));
+        const double below = l == 0 ? area_at[0] : counts[3 * l - 1].mm2;
         const double glued = std::min(area_at[0], below);
         result.glue_m2 += glued * 1e-6;
         result.bonding_minutes += bonding_minutes(job, box, glued, slab_of(plan, layer), together);
