@@ -229,6 +229,32 @@ void check_probes(const PlannedFolder& folder, std::vector<Violation>& violation
     }
 }
 
+/// What of the table the tip runs into where z 0 is found: as if it came from over the place, to half of
+/// probing.search under the touch.
+std::vector<Violation> probes_in_keep_outs(Context& context, const PlannedFolder& folder,
+                                           SimulationInput input) {
+    const BuildPlan& plan = folder.build;
+    if (plan.probes.empty() || input.machine.keep_outs.empty()) return {};
+    if (const std::optional<Tool> probe = probe_of(plan.job)) input.tools.push_back(*probe);
+    const Probing& probing = plan.job.probing;
+    if (probing.reference.size() != 3) return {};
+    const double touch = probing.reference[2] - plan.job.machine.base_board_thickness + probing.plate;
+    input.programs.clear();
+    for (const PlannedProbe& probe : plan.probes) {
+        Program& program = input.programs.emplace_back();
+        program.file = probe.file.substr(3);
+        program.layer = static_cast<int>(probe.layer);
+        program.tool = probe.tool;
+        for (const double z : {touch + probing.search / 2, touch - probing.search / 2})
+            program.steps.push_back({.x = plan.stock_min[0] + probing.reference[0],
+                                     .y = plan.stock_min[1] + probing.reference[1],
+                                     .z = z});
+    }
+    std::vector<Violation> found = check_keep_outs(context, input, plan.zero);
+    std::erase_if(found, [](const Violation& v) { return v.code != "keep_out.cut"; });
+    return found;
+}
+
 /// What nc/ holds beside the planned programs.
 void find_strangers(const PlannedFolder& folder, std::vector<Violation>& violations) {
     const fs::path programs = folder.path / "nc";
@@ -462,6 +488,8 @@ Verification verify_folder(Context& context, const std::string& directory, const
     find_strangers(folder, violations);
     const std::vector<Violation> entered = check_keep_outs(context, input, folder.build.zero);
     violations.insert(violations.end(), entered.begin(), entered.end());
+    const std::vector<Violation> probed = probes_in_keep_outs(context, folder, input);
+    violations.insert(violations.end(), probed.begin(), probed.end());
     BuildPlan build = folder.build;
     set_heights(build, input.programs);
     check_sequence(out / "sequence.json", build, violations);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -374,6 +375,53 @@ TEST(Probing, IsRefusedWhereNoCycleIsSure) {
                                         key))
                         .starts_with("job.range"))
             << key;
+}
+
+TEST(Probing, TheTipKeepsClearOfWhatStandsBesideThePad) {
+    const auto with_bolt = [](const std::string& job, double x) {
+        return fmt::format(
+            "{}zero = \"corner\"\n[[machine.keep_out]]\nname = \"bolt\"\ncircle = [{}, 25, 4]\nheight "
+            "= 20\nclearance = 5\n",
+            job, x);
+    };
+    // Tip 3 mm wide: 1.5 + 5 + 4 mm from middle to middle are enough.
+    const std::string probe =
+        "[probing]\nplate = 2.0\nreference = [-80.0, 25.0, 10.0]\n[machine]\ntable = \"fixed\"\nprobe = "
+        "\"cycle\"\n";
+    EXPECT_EQ(refusal(with_bolt(probe, -90.6)), "");
+    const std::string told = refusal(with_bolt(probe, -90.4));
+    EXPECT_TRUE(told.starts_with("keep_out.probe: T99 finds z 0 6.40 mm from \"bolt\"")) << told;
+    EXPECT_NE(told.find("move probing.reference"), std::string::npos) << told;
+    // A GRBL has each tool of the job touched off: the face mill is 25 mm to the side.
+    const std::string grbl =
+        "[probing]\nplate = 1.5\nreference = [-60.0, 25.0, 10.0]\n[machine]\npost = \"grbl\"\nprograms = "
+        "\"tool\"\ntable = \"fixed\"\nprobe = \"cycle\"\n";
+    EXPECT_TRUE(refusal(with_bolt(grbl, -93)).starts_with("keep_out.probe: T1 finds z 0 29.00 mm"));
+    EXPECT_EQ(refusal(with_bolt(grbl, -94.1)), "");
+}
+
+TEST(Probing, ABoltThatCameLaterIsToldAtThePad) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "out";
+    const Plan planned = made(std::string(kOnTable) + "zero = \"corner\"\n", out);
+    KeepOut bolt;
+    bolt.name = "bolt";
+    bolt.height = 5;
+    const auto found = [&](double x) {
+        bolt.circle = {x, 25, 4};
+        const std::vector<KeepOut> later{bolt};
+        Context context;
+        std::set<std::string> files;
+        for (const Violation& v :
+             verify_folder(context, out, {.source = PatternSource(kSphere), .cell = 1, .keep_outs = &later})
+                 .report.violations)
+            if (v.code == "keep_out.cut") files.insert(v.file);
+        return files;
+    };
+    EXPECT_TRUE(found(-50.6).empty());
+    std::set<std::string> probes;
+    for (const ProbeProgram& probe : planned.probes) probes.insert(probe.file);
+    EXPECT_EQ(found(-50.4), probes);
 }
 
 TEST(Probing, ABuildUnderWayIsResumedAndALayerMadeAgain) {

@@ -1,8 +1,11 @@
 // What is quoted at once, beside what a plan says.
 #include <gtest/gtest.h>
 
+#include <numbers>
 #include <numeric>
+#include <string_view>
 
+#include "engine/tools/tools.h"
 #include "io/quote.h"
 #include "io/slabwright.h"
 #include "io/write/stl_writer.h"
@@ -116,6 +119,45 @@ TEST(Quote, IsWrittenToTheDigitsThatMeanSomething) {
           "30.8,"
           "\"spread\":0.26,\"boards\":0,\"bought_m2\":0,\"cost\":null"})
         EXPECT_NE(packed.find(part), std::string::npos) << part << " in\n" << text;
+}
+
+// Walls of less than 8 mm, and air where the face mill does not fit, as wide as they are.
+TEST(Quote, MeasuresThinWallsAndNarrowAir) {
+    Context context;
+    const support::TemporaryFolder folder;
+    const Job job;
+    const auto ideal = [&](const shapes::Facets& facets, std::string_view name) {
+        const std::string stl = folder / "part.stl";
+        write_stl(stl, weld(context, facets));
+        for (const QuotedWork& w : quote_model(context, stl, job).quote.work)
+            if (w.name == name) return w.ideal_minutes;
+        return -1.0;
+    };
+    const LayerTools tools = fixed_tools(job);
+    const double levels = 17 / tools.finish.stepdown_max;
+    const auto wall = [](float thick) { return shapes::box({0, 0, 0}, {100, thick, 17}); };
+    const auto minutes = [](double mm, const Tool& tool) { return mm / tool.max_feed; };
+    EXPECT_NEAR(ideal(wall(4), "thin walls"), minutes(levels * 100 * 4 / 8, tools.finish), 1e-6);
+    EXPECT_NEAR(ideal(wall(7.9F), "thin walls"), minutes(levels * 100 * 7.9 / 8, tools.finish), 1e-6);
+    // Of a thick one the four corners, outside a circle.
+    const double corners = 4 * 4 * (4 - std::numbers::pi);
+    EXPECT_NEAR(ideal(wall(30), "thin walls"), minutes(levels * corners / 8, tools.finish),
+                minutes(levels * 4 / 8, tools.finish));
+    EXPECT_NEAR(ideal(wall(30), "narrow places"), 0, 1e-6);
+    // A frame of four bars around a hole that is square, too narrow for the face mill, or wide enough.
+    const auto frame = [](float wide) {
+        auto facets = shapes::box({0, 0, 0}, {20, wide + 40, 17});
+        shapes::append(facets, shapes::box({wide + 20, 0, 0}, {wide + 40, wide + 40, 17}));
+        shapes::append(facets, shapes::box({10, 0, 0}, {wide + 30, 20, 17}));
+        shapes::append(facets, shapes::box({10, wide + 20, 0}, {wide + 30, wide + 40, 17}));
+        return facets;
+    };
+    const Tool& rough = tools.rough;
+    const double swath = rough.diameter * rough.stepover * rough.stepdown_max;
+    EXPECT_NEAR(ideal(frame(30), "narrow places"), minutes(17. * 30 * 30 / swath, rough), 1e-6);
+    const double inner = 25 * 25 * (4 - std::numbers::pi);
+    EXPECT_NEAR(ideal(frame(100), "narrow places"), minutes(17. * inner / swath, rough),
+                minutes(17. * 20 / swath, rough));
 }
 
 TEST(Quote, RefusesWhatNoSlabHolds) {

@@ -205,6 +205,7 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     place_dowels(context, pattern, plan);
     if (propped) pattern = propped->view();
     place_keep_outs(plan, origin);
+    check_probed_place(plan, origin);
     (void)cut_list(plan);  // every slab is on a board
     bond_layers(context, plan, joints, origin);
     const std::vector<std::vector<StandingFoot>> feet = standing_feet(context, plan, joints);

@@ -26,27 +26,30 @@ constexpr double kBeside = 0.05;  // mm from a layer's ends to where it is cut b
 constexpr double kUpright = 89.5, kLevel = 0.5, kSteep = 45;  // degrees
 
 /// What milling takes over its ways at full feed, and minutes of a place in a layer: fitted to the programs
-/// of castings (bench/quote), least squares of relative errors, those over a quarter weighing less.
-/// Walls and floors are small beside these and go with the places.
+/// of castings and of a pool (bench/quote --fit), least squares of relative errors, those over a quarter
+/// weighing less. Walls and floors are small beside these and go with the places.
 struct Rates {
-    double facing = 3.745, roughing = 0.571, contours = 2.056, raster = 3.084;
-    double place = 3.359;   // min
-    double turn = 0.03389;  // min a radian: machines slow down where an outline turns
-    double thin = 48.22;    // min/min: where wood is thin, feeds are low and passes many
+    double facing = 2.433, roughing = 0.710, contours = 2.767, raster = 3.899;
+    double narrow =
+        27.46;            // narrow air is roughed by the end mill and again by the finishing tool, and slowly
+    double thin = 35.65;  // thin walls are spared by feed and by passes
+    double place = 2.585;   // min
+    double turn = 0.03091;  // min a radian: machines slow down where an outline turns
 };
 constexpr Rates kRates{};
 constexpr double kSmallPlace = 150;  // mm: a loop so long counts as half a place
 constexpr double kSeenTurn = 0.03;   // mm from a loop's chords, within which it may turn
 constexpr double kChanges = 3.2;     // of tools in a layer
-constexpr double kThin = 8;          // mm: of a section's mean half width at which it counts a third as thin
-constexpr double kLeastArea = 1e-3;  // mm²
+constexpr double kThin = 8;          // mm: walls that are thinner count
+constexpr double kSeenWidth = 0.05;  // mm, to which widths of wood and air are measured
 
 /// Ways of one kind in all layers, mm.
 struct Ways {
     double facing = 0, roughing = 0, contours = 0, raster = 0;
     double places = 0;  ///< loops of sections, small ones by their length
     double turns = 0;   ///< rad by which outlines turn back, over all levels
-    double thin = 0;    ///< mm around thin wood, over all levels
+    double thin = 0;    ///< mm along walls thinner than kThin, over all levels
+    double narrow = 0;  ///< mm of roughing where the face mill does not fit
 };
 
 const Tool& face_mill(const Job& job) {
@@ -54,6 +57,9 @@ const Tool& face_mill(const Job& job) {
         if (tool.kind == ToolKind::face) return tool;
     throw Error(ErrorKind::usage, "job.tool", "the library has no face mill", "tool", "give one");
 }
+
+/// mm³ that a tool takes away over a millimetre of clearing.
+double swath(const Tool& tool) { return tool.diameter * tool.stepover * tool.stepdown_max; }
 
 double perimeter(std::span<const Point2> loop) {
     double sum = 0;
@@ -77,19 +83,39 @@ double turning_back(std::span<const Point2> loop) {
     return std::max(0.0, (sum - 2 * std::numbers::pi) / 2);
 }
 
-/// What the outlines of one section count for. @param levels that are cut about it
-void add_outlines(const Loops& solid, double levels, Ways& ways) {
-    double around = 0;
+/// mm² of wood where no circle of this diameter fits: walls that are thinner, and sharp outer corners.
+double thin_area(const Loops& solid, double diameter) {
+    const Loops thick = offset(offset(solid, -diameter / 2, kSeenWidth), diameter / 2, kSeenWidth);
+    return std::max(0.0, area(solid) - area(thick));
+}
+
+/// mm² of air where no circle of this diameter fits, between walls and in inner corners.
+double narrow_area(const Loops& solid, double diameter) {
+    const Loops filled = offset(offset(solid, diameter / 2, kSeenWidth), -diameter / 2, kSeenWidth);
+    return std::max(0.0, area(filled) - area(solid));
+}
+
+/// What one section counts for.
+struct SectionCount {
+    double mm2 = 0;
+    double places = 0, turns = 0, thin = 0, narrow = 0;  ///< of Ways
+};
+
+/// @param height mm, of the part of a layer that it stands for
+SectionCount count_section(const Loops& section, double height, const LayerTools& tools, const Tool& face) {
+    const Loops solid = simplify(section);
+    SectionCount ways{.mm2 = area(solid)};
     for (std::size_t i = 0; i < solid.size(); ++i) {
         const double length = perimeter(solid.loop(i));
-        around += length;
         ways.places += length / (length + kSmallPlace) / 3;
     }
+    const double levels = height / tools.finish.stepdown_max;
     const Loops coarse = thinned(solid, kSeenTurn);
     for (std::size_t i = 0; i < coarse.size(); ++i) ways.turns += levels * turning_back(coarse.loop(i));
-    if (!(around > 0)) return;
-    const double half_width = 2 * std::max(area(solid), kLeastArea) / around;
-    ways.thin += levels * around * std::exp(-half_width / kThin);
+    const Loops seen = thinned(solid, kSeenWidth);
+    ways.thin = levels * thin_area(seen, kThin) / kThin;
+    ways.narrow = height * narrow_area(seen, face.diameter) / swath(tools.rough);
+    return ways;
 }
 
 /// Layers with the slabs that they are milled from, of the stocked thicknesses.
@@ -153,6 +179,29 @@ void add_surface(Context& context, MeshView mesh, const Job& job, const LayerToo
     ways.raster += sum.raster;
 }
 
+/// Of three sections in each layer, from below: near its bottom, in the middle, near its top.
+/// @param tops of the plan's layers, mm
+std::vector<SectionCount> count_sections(Context& context, MeshView mesh, const Plan& plan,
+                                         const std::vector<double>& tops, const LayerTools& tools,
+                                         const Tool& face) {
+    std::vector<Plane> planes;
+    double bottom = 0;
+    for (const double top : tops) {
+        const double beside = std::min(kBeside, (top - bottom) / 4);
+        planes.push_back({bottom + beside, Side::above});
+        planes.push_back({(bottom + top) / 2, Side::above});
+        planes.push_back({top - beside, Side::above});
+        bottom = top;
+    }
+    const std::vector<Section> sections = slice(context, mesh, planes);
+    std::vector<SectionCount> counts(sections.size());
+    parallel_each(context, sections.size(), [&](std::size_t i) {
+        const Layer& layer = plan.layers[i / 3];
+        counts[i] = count_section(sections[i].loops, (layer.z_top - layer.z_bottom) / 3, tools, face);
+    });
+    return counts;
+}
+
 /// Of a layer's slabs. @param glued mm² of the joint under it; those between its slabs are glued all over
 double bonding_minutes(const Job& job, const Box3& box, double glued, const Blank& slab, int slabs) {
     return (bonding_seconds(job, glued, double{box.max.x} - box.min.x) +
@@ -191,17 +240,14 @@ Quote quote(Context& context, MeshView mesh, const Job& asked) {
     saw_blanks(context, mesh, plan);
     result.boards = cut_list(plan);
 
-    std::vector<Plane> planes;
-    double bottom = 0;
-    for (const double top : layers.tops) {
-        const double beside = std::min(kBeside, (top - bottom) / 4);
-        planes.push_back({bottom + beside, Side::above});
-        planes.push_back({(bottom + top) / 2, Side::above});
-        planes.push_back({top - beside, Side::above});
-        bottom = top;
-    }
-    const std::vector<Section> sections = slice(context, mesh, planes);
+    const std::vector<SectionCount> counts = count_sections(context, mesh, plan, layers.tops, tools, face);
     Ways ways;
+    for (const SectionCount& count : counts) {
+        ways.places += count.places;
+        ways.turns += count.turns;
+        ways.thin += count.thin;
+        ways.narrow += count.narrow;
+    }
     std::map<double, int> slabs;
     double stack_mm3 = 0;
     for (std::size_t l = 0; l < layers.tops.size(); ++l) {
@@ -214,18 +260,15 @@ Quote quote(Context& context, MeshView mesh, const Job& asked) {
         stack_mm3 += stock_mm2 * slab * together;
         std::array<double, 3> area_at{};
         for (std::size_t k = 3; k-- > 0;) {
-            const Loops solid = simplify(sections[3 * l + k].loops);
-            area_at[k] = area(solid);
+            area_at[k] = counts[3 * l + k].mm2;
             if (k < 2) area_at[k] = std::max(area_at[k], area_at[k + 1]);  // what is under it stays filled
-            add_outlines(solid, height / tools.finish.stepdown_max / 3, ways);
         }
         const double solid_mm3 = (area_at[0] + 4 * area_at[1] + area_at[2]) / 6 * height;
         const double takes = slab * together - height;
         ways.facing += std::ceil(std::max(takes, 1e-3) / face.stepdown_max) * stock_mm2 /
                        (face.diameter * face.stepover);
-        ways.roughing += std::max(0.0, stock_mm2 * height - solid_mm3) /
-                         (tools.rough.diameter * tools.rough.stepover * tools.rough.stepdown_max);
-        const double below = l == 0 ? area_at[0] : area(simplify(sections[3 * l - 1].loops));
+        ways.roughing += std::max(0.0, stock_mm2 * height - solid_mm3) / swath(tools.rough);
+        const double below = l == 0 ? area_at[0] : counts[3 * l - 1].mm2;
         const double glued = std::min(area_at[0], below);
         result.glue_m2 += glued * 1e-6;
         result.bonding_minutes += bonding_minutes(job, box, glued, slab_of(plan, layer), together);
@@ -243,7 +286,8 @@ Quote quote(Context& context, MeshView mesh, const Job& asked) {
     work("roughing", ways.roughing, tools.rough, kRates.roughing);
     work("contours", ways.contours, tools.finish, kRates.contours);
     work("raster", ways.raster, tools.finish, kRates.raster);
-    work("thin wood", ways.thin, tools.finish, kRates.thin);
+    work("thin walls", ways.thin, tools.finish, kRates.thin);
+    work("narrow places", ways.narrow, tools.rough, kRates.narrow);
     result.work.push_back({"places", ways.places, kRates.place * ways.places});
     result.work.push_back({"turns", 0, kRates.turn * ways.turns});
     for (const QuotedWork& w : result.work) result.cutting_minutes += w.minutes;

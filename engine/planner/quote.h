@@ -35,7 +35,7 @@ struct Quote {
     double glue_m2 = 0;  ///< on all joints and the board
     double mass_kg = 0;  ///< of the stack with its board
     std::vector<QuotedWork> work;
-    /// Of four builds in five the time lies within this share of what is quoted.
+    /// Of nine builds in ten the time lies within this share of what is quoted.
     double spread = 0.25;
     double cutting_minutes = 0, bonding_minutes = 0, tool_change_minutes = 0, build_minutes = 0;
     CutList boards;

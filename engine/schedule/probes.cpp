@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
+#include "engine/schedule/fit.h"
+#include "engine/schedule/keep_outs.h"
 #include "engine/schedule/slab_steps.h"
 #include "kernels/errors.h"
 
@@ -13,6 +16,24 @@ namespace {
 
 constexpr const char* kByHand =
     "leave machine.probe at \"none\": the sequence asks the operator to touch off";
+
+/// What may be in the spindle while z 0 is found.
+std::vector<Tool> probing_tools(const Job& job) {
+    if (!knows_tool_lengths(job.machine.post)) return job.tools;
+    if (const std::optional<Tool> probe = probe_of(job)) return {*probe};
+    const auto tool =
+        std::ranges::find_if(job.tools, [&](const Tool& t) { return t.number == job.probing.tool; });
+    return {*tool};
+}
+
+/// The radius of the widest part of a tool that begins less than so far above its tip, mm; negative: none.
+double widest_below(const Tool& tool, double height) {
+    double radius = -1;
+    if (height > 0) radius = tool.diameter / 2;
+    if (height > tool.flute_length) radius = std::max(radius, tool.shank_diameter / 2);
+    if (height > tool.stickout) radius = std::max(radius, tool.holder_diameter / 2);
+    return radius;
+}
 
 [[noreturn]] void refuse(const std::string& message, const std::string& remedy) {
     throw Error(ErrorKind::usage, "job.probe", message, "machine.probe", remedy);
@@ -60,6 +81,33 @@ std::array<double, 3> probed_place(const Plan& plan, const Layer& layer) {
             plan.stock_min[1] + probing.reference[1] - to_mm(zero.y),
             probing.reference[2] - machine.base_board_thickness + probing.plate -
                 zero_height(machine, layer.z_top)};
+}
+
+void check_probed_place(const Plan& plan, const std::array<double, 2>& origin) {
+    const Job& job = plan.job;
+    if (job.machine.probe == ProbeMode::none || job.machine.keep_outs.empty()) return;
+    const std::array<double, 2> at{plan.stock_min[0] + job.probing.reference[0],
+                                   plan.stock_min[1] + job.probing.reference[1]};
+    const double lowest = job.probing.reference[2] - job.machine.base_board_thickness + job.probing.plate -
+                          job.probing.search / 2;
+    const std::vector<Tool> tools = probing_tools(job);
+    for (const Layer& layer : plan.layers)
+        for (const KeepOutZone& zone : keep_outs_in(plan, layer, origin)) {
+            const double away = distance_to(zone, at, at);
+            for (const Tool& tool : tools) {
+                const double radius = widest_below(tool, zone.top - lowest);
+                if (!(radius >= 0) || away >= radius + zone.clearance) continue;
+                throw refusal(
+                    "keep_out.probe",
+                    fmt::format(
+                        "T{} finds z 0 {:.2f} mm from \"{}\": it is {:.2f} mm wide there, and {:.2f} mm "
+                        "must stay clear",
+                        tool.number, away, zone.name, 2 * radius, zone.clearance),
+                    fmt::format("layer {}, x {:.2f} y {:.2f} mm", layer.index, at[0] + origin[0],
+                                at[1] + origin[1]),
+                    "move probing.reference, or the keep-out");
+            }
+        }
 }
 
 int add_probe(Plan& plan, const Layer& layer, int tool, int files, std::vector<int> needs) {
