@@ -142,7 +142,7 @@ private:
     void add(const Tool& tool) {
         EdgeTool& t = tools_.emplace_back();
         t.tool = &tool;
-        t.drops = &cut_.drops(cutter_of(cutter_shape(tool)));
+        t.drops = &cut_.drops(cutter_shape(tool));
         t.end = cutter_end(tool);
         t.radius = tool.diameter / 2;
         t.ball = tool.kind == ToolKind::ball;
