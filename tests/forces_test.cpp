@@ -437,6 +437,13 @@ TEST(HardestCuts, AreTheSameWithADeviceAndWithout) {
     EXPECT_TRUE(without.device.empty());
     ASSERT_EQ(with.groups.size(), starts.size() - 1);
     EXPECT_EQ(with.groups, without.groups);
+    // A solver that has no device leaves all of it to the double model, and says why.
+    ForceSolver reference(context, "reference");
+    const HardestSearch fallen_back = hardest_cuts(context, cuts, starts, &reference);
+    EXPECT_EQ(fallen_back.groups, without.groups);
+    EXPECT_EQ(fallen_back.device, "reference");
+    EXPECT_EQ(fallen_back.note, reference.note());
+    EXPECT_EQ(with.note, ahead.solver()->on_device() ? "" : ahead.solver()->note());
     for (std::size_t g = 0; g + 1 < starts.size(); ++g) {
         double most = 0;
         for (std::size_t i = starts[g]; i < starts[g + 1]; ++i)
