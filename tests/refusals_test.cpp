@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <limits>
 
@@ -16,6 +17,7 @@
 #include "io/read/bond_csv.h"
 #include "io/read/job_toml.h"
 #include "io/slabwright.h"
+#include "io/split.h"
 #include "io/text/json_text.h"
 #include "io/write/access_ply.h"
 #include "io/write/draw_ply.h"
@@ -148,6 +150,29 @@ TEST(Refusals, TheFrontDoor) {
     inches.units = LengthUnit::inch;
     const std::shared_ptr<Pattern> read = read_pattern(context, PatternSource{stl}, Job{});
     EXPECT_EQ(refusal([&] { (void)plan(context, *read, inches); }), "plan.reading");
+}
+
+TEST(Refusals, OtherPatternsAndOpenOnes) {
+    Context context;
+    const TemporaryFolder folder;
+    const std::string stl = folder / "box.stl", other = folder / "other.stl", open = folder / "open.stl";
+    write_model(stl, box_of(context, 10));
+    write_model(other, box_of(context, 11));
+    const Plan planned = plan(context, PatternSource{stl}, Job{});
+    EXPECT_EQ(refusal([&] { write_access_maps(context, planned, other, folder / "maps"); }),
+              "access_maps.stl");
+    EXPECT_FALSE(std::filesystem::exists(folder / "maps"));
+
+    shapes::Facets facets = shapes::box({0, 0, 0}, {20, 20, 10});
+    facets.erase(facets.begin(), facets.begin() + 2);
+    write_model(open, weld(context, facets));
+    SplitRequest halves;
+    halves.plane.offset_mm = 5;
+    halves.out = {folder / "a.stl", folder / "b.stl"};
+    EXPECT_EQ(refusal([&] { (void)split_model(context, PatternSource{stl}, Job{}, halves); }), "");
+    EXPECT_EQ(refusal([&] { (void)split_model(context, PatternSource{open}, Job{}, halves); }), "split.open");
+    halves.out[1] = halves.out[0];
+    EXPECT_EQ(refusal([&] { (void)split_model(context, PatternSource{stl}, Job{}, halves); }), "split.out");
 }
 
 TEST(Refusals, MapsOfTools) {
