@@ -15,7 +15,9 @@ namespace {
 const std::string kBox =
     "(stock 300 x 200 thickness 6 kerf 6 router)\n"
     "(piece 1 from 0 to 6 turn 0 at 20 20)\n"
-    "G21 G90\n"
+    "G21 G17 G90 G94 G40 G49 G80\n"
+    "G64 P0.005\n"
+    "G54\n"
     "T1 M6\n"
     "G43 H1\n"
     "M3 S18000\n"

@@ -16,7 +16,9 @@ const std::string kRouter =
     "(piece 1 from 0 to 6 turn 90 at 10 20)\n"
     "(dowel of piece 1 at 30 40 diameter 8)\n"
     "(engraver tool 2 width 1 depth 0.5)\n"
-    "G21 G90\n"
+    "G21 G17 G90 G94 G40 G49 G80\n"
+    "G64 P0.005\n"
+    "G54\n"
     "T2 M6\n"
     "G43 H2\n"
     "M3 S18000\n"
@@ -46,7 +48,9 @@ const std::string kJet =
     "(head on M62 P0 off M63 P0)\n"
     "(engraver feed 4000 width 1 depth 0.5)\n"
     "(taper 1)\n"
-    "G21 G90\n"
+    "G21 G17 G90 G94 G40 G49 G80\n"
+    "G64 P0.005\n"
+    "G54\n"
     "(engraving of piece 1 1)\n"
     "G0 X20 Y20 Z0\n"
     "M62 P0\n"
@@ -98,7 +102,7 @@ TEST(SheetReader, ReadsWhatProgramsSay) {
 
 TEST(SheetReader, RefusesWhatRoutersCannotMean) {
     struct Change {
-        const char *from, *to, *code;
+        std::string from, to, code;
     };
     for (const Change& c : std::vector<Change>{
              {"kerf 6 router)", "kerf 6 router", "gcode.comment"},
@@ -131,6 +135,33 @@ TEST(SheetReader, RefusesWhatRoutersCannotMean) {
              {"X50", "X50 B1", "gcode.unknown_word"},
              {"M5", "M4", "gcode.unknown_word"},
              {"T1 M6\nG43 H1", "G43 H2", "gcode.tool"},
+             {"G43 H1", "G43 H1 G0 X0\nG49", "gcode.tool_length"},
+             {"X50 F3000", "G49\nX50 F3000", "gcode.tool_length"},
+             {"M3 S12000", "M3 S0", "gcode.spindle"},
+             {" S18000", "", "gcode.spindle"},
+             {"G17 ", "", "gcode.unset"},
+             {"G21 ", "", "gcode.unset"},
+             {"G90 ", "", "gcode.unset"},
+             {"G94 ", "", "gcode.unset"},
+             {"G40 ", "", "gcode.unset"},
+             {"G64 P0.005\n", "", "gcode.unset"},
+             {"G54\n", "", "gcode.unset"},
+             {"G0 X20", "X20", "gcode.unset"},
+             {"X50 F3000", "G80\nX50 F3000", "gcode.unset"},
+             {"G64 P0.005", "G64", "gcode.path_mode"},
+             {"G64 P0.005", "G64 P0.5", "gcode.path_mode"},
+             {"X50 F3000", "G64 P1\nX50 F3000", "gcode.path_mode"},
+             {"M3 S18000", "M3 S18000\nG4", "gcode.dwell"},
+             {"X50", "X50 P1", "gcode.unused_word"},
+             {"X50", "X50 H1", "gcode.unused_word"},
+             {"X50", "X50 X60", "gcode.twice"},
+             {"X50", "G0 G1 X50", "gcode.twice"},
+             {"T2 M6", "T2 M6 M3", "gcode.twice"},
+             {"X50", "(a) X50 (b)", "gcode.comment"},
+             {"X50", "(LOGOPEN,a.txt)\nX50", "gcode.comment"},
+             {"X50", "(PROBEOPEN a.txt)\nX50", "gcode.comment"},
+             {"X50 F", "(" + std::string(300, 'a') + ")\nX50 F", "gcode.line_length"},
+             {"X50", std::string("X50\0 Z-9", 8), "gcode.character"},
              {"M2\n", "M2\nX0\n", "gcode.after_end"},
              {"M2\n", "", "gcode.no_end"},
          })
@@ -140,11 +171,11 @@ TEST(SheetReader, RefusesWhatRoutersCannotMean) {
 
 TEST(SheetReader, RefusesWhatJetsCannotMean) {
     struct Change {
-        const char *from, *to, *code;
+        std::string from, to, code;
     };
     for (const Change& c : std::vector<Change>{
              {"(taper 1)", "(taper 11)", "gcode.taper"},
-             {"G21 G90", "G21 G90\n(taper 1)", "gcode.taper"},
+             {"G54\n", "G54\n(taper 1)\n", "gcode.taper"},
              {"(taper 1)", "(pivot -1)", "gcode.pivot"},
              {"off M63 P0)", "off M62 P0)", "gcode.switch"},
              {"on M62 P0 off", "on M62 P0 of", "gcode.switch"},
@@ -155,11 +186,14 @@ TEST(SheetReader, RefusesWhatJetsCannotMean) {
              {"A10", "A-1", "gcode.head"},
              {"A10", "Z1", "gcode.height"},
              {"G1 X50", "G0 X50", "gcode.rapid"},
-             {"G21 G90", "G21 G90\nT1 M6", "gcode.unknown_word"},
+             {"G54\n", "G54\nT1 M6\n", "gcode.unknown_word"},
              {"M63 P0\nM2", "M62 P0\nM2", "gcode.switch"},
              {"M63 P0\nM2", "M2", "gcode.left_on"},
              {"F1000", "F1000 G93\nX10", "gcode.feed"},
              {"(cut of", "(cat of", "gcode.head"},
+             {"G49 ", "", "gcode.unset"},
+             {"G1 X50", "S0\nG1 X50", "gcode.power"},
+             {"M63 P0\nM2", "M63 P1\nM2", "gcode.unknown_word"},
          })
         EXPECT_EQ(refused(kJet, c.from, c.to), c.code) << c.from << " -> " << c.to;
     const std::string laser = "(engraver power 20 width 1 depth 0.5)";

@@ -9,6 +9,8 @@
 #include <numbers>
 
 #include "engine/sheets/sheet_plan.h"
+#include "io/posts/dialect.h"
+#include "io/posts/gcode_line.h"
 #include "kernels/errors.h"
 
 namespace slabwright {
@@ -16,7 +18,33 @@ namespace slabwright {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kAtTop = 1e-3;  ///< mm: heights are written in steps
+constexpr double kAtTop = 1e-3;         ///< mm: heights are written in steps
+constexpr double kMostBlending = 0.01;  ///< mm by which a control may round corners (G64 P)
+
+/// What words of a group change: one of each may stand in a line, and all but the first and the last must be
+/// stated before the head moves.
+enum Group : unsigned {
+    kMotion,
+    kPlane,
+    kUnits,
+    kDistances,
+    kFeedMode,
+    kRadius,
+    kLength,
+    kPath,
+    kFrame,
+    kDwell
+};
+constexpr unsigned kHead = 1u << kPlane | 1u << kUnits | 1u << kDistances | 1u << kFeedMode | 1u << kRadius |
+                           1u << kLength | 1u << kPath | 1u << kFrame;
+struct KnownWord {
+    double number;
+    Group group;
+};
+constexpr KnownWord kKnownWords[] = {{0, kMotion},  {1, kMotion},     {80, kMotion},   {17, kPlane},
+                                     {21, kUnits},  {90, kDistances}, {93, kFeedMode}, {94, kFeedMode},
+                                     {40, kRadius}, {43, kLength},    {49, kLength},   {64, kPath},
+                                     {54, kFrame},  {4, kDwell}};
 
 /// Reads one program line by line.
 class SheetReader {
@@ -25,7 +53,7 @@ public:
 
     void line(std::string_view text, std::uint32_t number) {
         number_ = number;
-        if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
+        check_characters(text, {program_.file, number_}, dialect_);
         if (ended_ && !text.empty()) fail("gcode.after_end", "words after the program's end");
         if (!text.empty() && text.front() == '(') comment(text);
         else if (!text.empty()) words(text);
@@ -65,7 +93,9 @@ private:
     }
 
     void comment(std::string_view text) {
-        if (text.back() != ')') fail("gcode.comment", "a comment that does not end in its line");
+        if (text.find_first_of("()", 1) != text.size() - 1)
+            fail("gcode.comment", "a comment that is not all of its line");
+        check_comment(text.substr(1, text.size() - 2), {program_.file, number_});
         const auto w = split(text.substr(1, text.size() - 2));
         const auto value = [&](std::size_t i) { return number_of(w[i]); };
         const auto whole = [&](std::size_t i) {
@@ -159,8 +189,10 @@ private:
 
     struct Block {
         double x = 0, y = 0, z = 0, a = 0, c = 0;
-        double feed = -1, tool = -1, length = -1;
+        double feed = -1, tool = -1, length = -1, p = -1;
         bool moves = false, moves_z = false, changes = false, offsets = false;
+        std::uint32_t letters = 0;  ///< that stand in it, G aside
+        unsigned groups = 0;        ///< of its G words
     };
 
     void words(std::string_view text) {
@@ -168,6 +200,7 @@ private:
         if (!program_.is_routed && (text == on_text_ || text == off_text_)) return switched(text == on_text_);
         Block block{x_, y_, z_, a_, c_};
         for (const std::string_view word : split(text)) take(word, block);
+        check_numbers(block);
         if (block.changes || block.offsets) change_tool(block);
         if (block.feed >= 0 && !(block.feed > 0)) fail("gcode.feed", "a feed of nothing");
         if (block.feed > 0) feed_ = block.feed;
@@ -176,12 +209,28 @@ private:
         if (block.moves || block.moves_z) motion(block.x, block.y, block.z, block.a, block.c);
     }
 
+    /// What belongs to a G word stands beside it, and nothing else does.
+    void check_numbers(const Block& block) const {
+        const bool dwells = (block.groups >> kDwell & 1u) != 0, blends = (block.groups >> kPath & 1u) != 0;
+        if (dwells && !(block.p >= 0)) fail("gcode.dwell", "a dwell without its time");
+        if (blends && !(block.p >= 0 && block.p <= kMostBlending))
+            fail("gcode.path_mode", fmt::format("corners may be rounded by more than {} mm", kMostBlending));
+        if ((block.letters >> ('P' - 'A') & 1u) != 0 && !dwells && !blends)
+            fail("gcode.unused_word", "a P that belongs to no word");
+        if (block.length >= 0 && !block.offsets) fail("gcode.unused_word", "an H that belongs to no word");
+    }
+
     void take(std::string_view word, Block& block) {
         const double v = number_of(word.substr(1));
+        if (word[0] >= 'A' && word[0] <= 'Z' && word[0] != 'G') {
+            const std::uint32_t letter = 1u << (word[0] - 'A');
+            if ((block.letters & letter) != 0)
+                fail("gcode.twice", std::string("two words ") + word[0] + " in a line");
+            block.letters |= letter;
+        }
         switch (word[0]) {
             case 'G':
-                g(v);
-                block.offsets = block.offsets || v == 43;
+                g(v, block);
                 break;
             case 'M':
                 m(v);
@@ -212,9 +261,12 @@ private:
                 block.length = v;
                 break;
             case 'S':
+                if (!(v > 0))
+                    fail(program_.is_routed ? "gcode.spindle" : "gcode.power", "a speed or power of nothing");
                 power_ = v;
                 break;
             case 'P':
+                block.p = v;
                 break;
             default:
                 fail("gcode.unknown_word", std::string("no word ") + word[0] + " is known here");
@@ -236,14 +288,18 @@ private:
     }
 
     void motion(double x, double y, double z, double a, double c) {
-        if (!is_set_) fail("gcode.unset", "a motion before units, plane and distances are stated");
+        if (!is_set_)
+            fail("gcode.unset",
+                 "a motion before G17, G21, G40, G49, G54, G64, G90 and G94 have all been stated");
+        if (!has_mode_) fail("gcode.unset", "a motion, and neither G0 nor G1 is in force");
         if (!rapid_ && !(feed_ > 0)) fail("gcode.feed", "a cut without a feed");
         if (program_.is_routed && !has_length_)
             fail("gcode.tool_length", "a motion without the tool's length");
         const bool cuts = program_.is_routed ? z < 0 || z_ < 0 : on_;
         if (cuts && rapid_ && !(program_.is_routed && x == x_ && y == y_ && z >= z_))
             fail("gcode.rapid", "a rapid that cuts");
-        if (cuts && !on_) fail("gcode.spindle", "a cut with the spindle at rest");
+        if (cuts && (!on_ || (program_.is_routed && power_ == 0)))
+            fail("gcode.spindle", "a cut with the spindle at rest");
         if (cuts && !program_.is_routed && std::abs(z + pivot_ * (1 - std::cos(a * kDegree))) > kAtTop)
             fail("gcode.height", "the jet is on away from the sheet's top");
         if (program_.is_routed && (a != 0 || c != 0)) fail("gcode.head", "a router's head that leans");
@@ -323,17 +379,21 @@ private:
         program_.ways.push_back(next_);
     }
 
-    void g(double v) {
-        static constexpr double known[] = {4, 17, 21, 40, 43, 49, 54, 64, 80, 90};
-        if (v == 0) rapid_ = true;
-        else if (v == 1) rapid_ = false;
-        else if (v == 93) inverse_ = true;
-        else if (v == 94) inverse_ = false;
-        else if (std::find(std::begin(known), std::end(known), v) == std::end(known))
+    void g(double v, Block& block) {
+        const KnownWord* known = std::find_if(std::begin(kKnownWords), std::end(kKnownWords),
+                                              [&](const KnownWord& word) { return word.number == v; });
+        if (known == std::end(kKnownWords))
             fail("gcode.unknown_word", fmt::format("G{} is none of these programs' words", v));
-        if (v == 21) has_mm_ = true;
-        if (v == 90) has_absolute_ = true;
-        is_set_ = has_mm_ && has_absolute_;
+        const unsigned group = 1u << known->group;
+        if ((block.groups & group) != 0)
+            fail("gcode.twice", fmt::format("G{} beside another word for the same in a line", v));
+        block.groups |= group;
+        stated_ |= group;
+        is_set_ = (stated_ & kHead) == kHead;
+        if (known->group == kMotion) has_mode_ = v != 80, rapid_ = v == 0;
+        if (known->group == kFeedMode) inverse_ = v == 93;
+        if (v == 43) block.offsets = true;
+        if (v == 49) has_length_ = false;
     }
 
     void m(double v) {
@@ -347,6 +407,7 @@ private:
         }
     }
 
+    const Dialect dialect_ = dialect_of(Post::linuxcnc);
     ReadSheetProgram program_;
     ReadWay next_;
     std::uint32_t number_ = 0;
@@ -355,7 +416,8 @@ private:
     int tool_ = 0;
     std::string on_text_ = "M3", off_text_ = "M5";
     bool has_stock_ = false, ended_ = false, named_ = false, rapid_ = true, on_ = false, inverse_ = false;
-    bool has_mm_ = false, has_absolute_ = false, is_set_ = false, has_length_ = false;
+    unsigned stated_ = 0;  // groups
+    bool has_mode_ = false, is_set_ = false, has_length_ = false;
     bool is_engraving_ = false;
 };
 
