@@ -6,8 +6,10 @@
 
 #include "engine/sheet_proof/sheet_proof.h"
 #include "io/posts/sheet_reader.h"
+#include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
 #include "tests/mesh_shapes.h"
+#include "tests/support/sheet_proofs.h"
 
 namespace slabwright {
 namespace {
@@ -21,8 +23,10 @@ const std::string kBox =
     "T1 M6\n"
     "G43 H1\n"
     "M3 S18000\n"
+    "G4 P3\n"
     "(cut of piece 1 loop 0 pass 0 outline)\n"
-    "G0 X12 Y12 Z5\n"
+    "G0 Z5\n"
+    "G0 X12 Y12\n"
     "G1 Z-6.2 F800\n"
     "X17 Y17 F3000\n"
     "X43\n"
@@ -89,6 +93,39 @@ TEST_F(SheetProofs, CutsGoThrough) {
     EXPECT_EQ(found("Z-6.2", "Z-5.999"), Codes{}) << "within the text's digits";
     EXPECT_EQ(found("Z-6.2", "Z-5.9"), Codes{"sheets.depth"}) << "a skin is left, thinner than is looked at";
     EXPECT_TRUE(found("Z-6.2", "Z-3").contains("sheets.depth"));
+}
+
+// Whatever one line of a program is missing, the rest is refused, is found fault with, or does the same.
+TEST(SheetProofsOfPlans, EveryLineLostIsToldOrDoesNothing) {
+    Context context;
+    const Mesh mesh = weld(context, shapes::box({0, 0, 0}, {20, 20, 12}));
+    for (const SheetHead head : {SheetHead::router, SheetHead::laser, SheetHead::jet}) {
+        SheetJob job;
+        job.head = head;
+        job.slicing.thicknesses = {6};
+        job.cutting.kerf = head == SheetHead::router ? 6 : 0.8;
+        const std::string text = support::texts_of(plan_sheets(context, mesh, job)).at(0);
+        ASSERT_TRUE(support::proof_of(context, mesh, {text}).passed);
+        std::string passes;
+        for (std::size_t at = 0; at < text.size();) {
+            const std::size_t end = text.find('\n', at) + 1;
+            const std::string line = text.substr(at, end - at);
+            try {
+                // A place that lies on a straight line, or all but on it, does nothing.
+                if (support::proof_of(context, mesh, {text.substr(0, at) + text.substr(end)}).passed &&
+                    line[0] != 'X')
+                    passes += line;
+            } catch (const Error& error) {
+                EXPECT_EQ(error.kind(), ErrorKind::verification) << error.what();
+            }
+            at = end;
+        }
+        // A plunge from higher up is only slower, M2 stops the spindle too, and a head may end where it is.
+        EXPECT_EQ(passes, head == SheetHead::router
+                              ? "(slabwright sheets: program 1 of 1)\nG0 Z1\nG0 Z1\nM5\n"
+                              : "(slabwright sheets: program 1 of 1)\nG0 Z5\n")
+            << text.substr(0, 900);
+    }
 }
 
 }  // namespace

@@ -22,8 +22,10 @@ const std::string kRouter =
     "T2 M6\n"
     "G43 H2\n"
     "M3 S18000\n"
+    "G4 P3\n"
     "(engraving of piece 1 12)\n"
-    "G0 X20 Y20 Z5\n"
+    "G0 Z5\n"
+    "G0 X20 Y20\n"
     "G1 Z-0.5 F800\n"
     "X25\n"
     "G0 Z5\n"
@@ -31,8 +33,10 @@ const std::string kRouter =
     "T1 M6\n"
     "G43 H1\n"
     "M3 S12000\n"
+    "G4 P3\n"
     "(cut of piece 1 loop 0 pass 0 outline)\n"
-    "G0 X10 Y10 Z5\n"
+    "G0 Z5\n"
+    "G0 X10 Y10\n"
     "G1 Z-3 F800\n"
     "X50 F3000\n"
     "X10\n"
@@ -52,13 +56,18 @@ const std::string kJet =
     "G64 P0.005\n"
     "G54\n"
     "(engraving of piece 1 1)\n"
-    "G0 X20 Y20 Z0\n"
+    "G0 Z5\n"
+    "G0 X20 Y20\n"
+    "G0 Z0\n"
     "M62 P0\n"
     "G1 X25 F4000\n"
     "M63 P0\n"
     "(cut of piece 1 loop 0 pass 0 outline)\n"
-    "G0 X10 Y10 Z0\n"
+    "G0 Z5\n"
+    "G0 X10 Y10\n"
+    "G0 Z0\n"
     "M62 P0\n"
+    "G4 P0\n"
     "G1 X50 A10 C90 F1000\n"
     "M63 P0\n"
     "M2\n";
@@ -131,11 +140,18 @@ TEST(SheetReader, RefusesWhatRoutersCannotMean) {
              {"Z-6", "X30 Z-6", "gcode.plunge"},
              {"G0 Z5\nM2", "G0 X0 Z5\nM2", "gcode.rapid"},
              {"G0 Z5\nM2", "T2 M6\nM2", "gcode.tool"},
+             {"G0 Z5\nM2", "M2", "gcode.left_on"},
+             {"G0 Z5\nM2", "M5\nG0 Z5\nM2", "gcode.spindle"},
+             {"G0 Z5\nG0 X20 Y20", "G0 X20 Y20 Z5", "gcode.start"},
+             {"G0 Z5\nG0 X20 Y20\n", "G0 Z5\n", "gcode.start"},
+             {"G0 Z5\nG0 X20 Y20\n", "G0 X20 Y20\n", "gcode.start"},
+             {"G0 Z5\nG0 X10 Y10\n", "G0 X10 Y10\n", "gcode.start"},
+             {"G0 Z5\nG0 X10 Y10\n", "", "gcode.start"},
              {"X50", "X50 A1", "gcode.head"},
              {"X50", "X50 B1", "gcode.unknown_word"},
              {"M5", "M4", "gcode.unknown_word"},
              {"T1 M6\nG43 H1", "G43 H2", "gcode.tool"},
-             {"G43 H1", "G43 H1 G0 X0\nG49", "gcode.tool_length"},
+
              {"X50 F3000", "G49\nX50 F3000", "gcode.tool_length"},
              {"M3 S12000", "M3 S0", "gcode.spindle"},
              {" S18000", "", "gcode.spindle"},
@@ -146,8 +162,15 @@ TEST(SheetReader, RefusesWhatRoutersCannotMean) {
              {"G40 ", "", "gcode.unset"},
              {"G64 P0.005\n", "", "gcode.unset"},
              {"G54\n", "", "gcode.unset"},
-             {"G0 X20", "X20", "gcode.unset"},
+             {"G0 Z5", "Z5", "gcode.unset"},
              {"X50 F3000", "G80\nX50 F3000", "gcode.unset"},
+             {"M5\n", "", "gcode.spindle"},
+             {"G4 P3\n", "", "gcode.spin_up"},
+             {"G4 P3\n", "G4 P0.003\n", "gcode.spin_up"},
+             {"G1 Z-0.5 F800\n", "G1 F800\n", "gcode.air"},
+             {"X50 F3000\nX10\n", "X50 F3000\nX51\nX10\n", "gcode.depths"},
+             {"X50 F3000\nX10\n", "X51 F3000\nX10\n", "gcode.depths"},
+             {"Z-6\nX50\nX10\n", "Z-6\nX50\nX50 Y11\nX10 Y10\n", "gcode.depths"},
              {"G64 P0.005", "G64", "gcode.path_mode"},
              {"G64 P0.005", "G64 P0.5", "gcode.path_mode"},
              {"X50 F3000", "G64 P1\nX50 F3000", "gcode.path_mode"},
@@ -192,6 +215,11 @@ TEST(SheetReader, RefusesWhatJetsCannotMean) {
              {"F1000", "F1000 G93\nX10", "gcode.feed"},
              {"(cut of", "(cat of", "gcode.head"},
              {"G49 ", "", "gcode.unset"},
+             {"G0 X20 Y20\n", "", "gcode.start"},
+             {"G0 Z5\nG0 X20 Y20\nG0 Z0\n", "", "gcode.start"},
+             {"G0 Z0\n", "", "gcode.height"},
+             {"G0 Z5\nG0 X10", "G0 X10", "gcode.rapid"},
+             {"G4 P0\n", "", "gcode.dwell"},
              {"G1 X50", "S0\nG1 X50", "gcode.power"},
              {"M63 P0\nM2", "M63 P1\nM2", "gcode.unknown_word"},
          })
