@@ -147,5 +147,11 @@ for place, change, line, verdict in mutants.read_list(kept):
     expect((source / file).exists(), f"{kept}: {file} is gone; strike its rows")
     expect(verdict.startswith(("equal: ", "killed by ", "open: ")) and len(verdict) > 12, f"{kept}: {place} has the verdict {verdict!r}")
 
+# ---- Refusals that no test reaches: each is a line that still stands, with a reason
+for row in (source / "tests/unreached_errors.tsv").read_text().splitlines()[1:]:
+    file, line, why = row.split("\t")
+    stands = any(text.strip() == line for text in (source / file).read_text().splitlines()) if (source / file).exists() else False
+    expect(stands and len(why) > 12, f"tests/unreached_errors.tsv: {file}: {line}: the line is gone, or has no reason")
+
 print(f"{failures} failed")
 sys.exit(1 if failures else 0)
