@@ -2,6 +2,7 @@
 // out of range, lists that do not belong together, names that are none.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -228,6 +229,20 @@ TEST(Refusals, SimulationsOfNothing) {
     EXPECT_EQ(simulated([](SimulationInput& in) { in.programs.emplace_back().layer = 1; }), "simulate.input");
     EXPECT_EQ(simulated([](SimulationInput& in) { in.programs.emplace_back().layer = -1; }),
               "simulate.input");
+
+    // A layer that does not lie on the one before is no nonsense, but a fault of the stack.
+    SimulationInput apart = one_slab(mesh);
+    apart.layers.push_back(apart.layers[0]);
+    const auto has_gap = [&](double z_bottom) {
+        apart.layers[1].z_bottom = z_bottom;
+        apart.layers[1].z_top = z_bottom + 10;
+        const SimulationReport report = simulate(context, apart, part);
+        return std::any_of(report.violations.begin(), report.violations.end(),
+                           [](const Violation& v) { return v.code == "stack.gap"; });
+    };
+    EXPECT_FALSE(has_gap(10));
+    EXPECT_FALSE(has_gap(10.0009));
+    EXPECT_TRUE(has_gap(10.01));
 
     const auto replayed = [&](const ReplayOptions& options, int layer) {
         SimulationInput input = one_slab(mesh);
