@@ -1,11 +1,14 @@
 #!/usr/bin/env python3
-"""bench/fuzzing: lines of its ledger from what libFuzzer prints, and their totals: fuzzing_test.py SOURCE_DIR"""
+"""bench/fuzzing and tools/fuzz: lines of the ledger from what libFuzzer prints, and their totals: fuzzing_test.py SOURCE_DIR"""
+import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
 
-script = pathlib.Path(sys.argv[1]) / "bench/fuzzing"
+source = pathlib.Path(sys.argv[1])
+script = source / "bench/fuzzing"
 failures = 0
 
 LOG = """INFO: Loaded 1 modules   (4321 inline 8-bit counters): 4321 [0x1, 0x2),
@@ -53,4 +56,32 @@ with tempfile.TemporaryDirectory() as folder:
     ledger.write_text(kept + "2026-01-01\tabc\tjob\tmany\n")
     status, text = ran("--ledger", ledger)
     expect(status == 2 and ":5:" in text, f"a line that is none: {status} {text}")
+
+# ---- tools/fuzz with a target that only prints, and leaves a find behind; nothing is built
+with tempfile.TemporaryDirectory() as folder:
+    root = pathlib.Path(folder)
+    for part in ("tools", "bench", "bin", "tests/fuzz", "build/asan"):
+        (root / part).mkdir(parents=True)
+    shutil.copy(source / "tools/fuzz", root / "tools")
+    shutil.copy(script, root / "bench")
+    (root / "tests/fuzz/job_fuzz.cpp").write_text("")
+    (root / "log").write_text(LOG)
+
+    def program(path, text):
+        (root / path).write_text("#!/bin/sh\n" + text)
+        (root / path).chmod(0o755)
+
+    def fuzz():
+        return subprocess.run([root / "tools/fuzz", "job", "--minutes", "0.02", "--ledger", "ledger.tsv"], capture_output=True, text=True,
+                              env={**os.environ, "PATH": f"{root / 'bin'}:{os.environ['PATH']}"})
+
+    program("bin/cmake", "exit 0\n")
+    program("build/asan/job_fuzz", "cat log\n")
+    clean = fuzz()
+    expect(clean.returncode == 0 and "900 executions" in clean.stdout and "clean" in clean.stdout, f"a clean run: {clean}")
+    program("build/asan/job_fuzz", "cat log; echo x >build/fuzz/job.finds/crash-1; kill -ABRT $$\n")
+    found = fuzz()
+    expect(found.returncode == 1 and "FOUND SOMETHING: crash-1" in found.stdout, f"a run that finds something: {found}")
+    rows = [line.split("\t") for line in (root / "ledger.tsv").read_text().splitlines()]
+    expect([row[2] for row in rows[1:]] == ["job", "job"] and [row[-1] for row in rows[1:]] == ["0", "1"], f"the ledger of two runs: {rows}")
 sys.exit(1 if failures else 0)
