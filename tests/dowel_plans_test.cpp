@@ -259,6 +259,9 @@ TEST(DowelPlans, ASpoiltPlanListOrSequenceIsTold) {
             "dowel.list"));
     EXPECT_TRUE(has(told(list_file, list + "2,1,x\n"), "dowel.list_unreadable"));
     EXPECT_TRUE(has(told(list_file, "nothing\n"), "dowel.list_unreadable"));
+    std::filesystem::rename(list_file, list_file + ".kept");
+    EXPECT_EQ(built.found(built.program(0), slurp(built.program(0))), "dowel.no_list");
+    std::filesystem::rename(list_file + ".kept", list_file);
     // The sequence: a dowel too few, none at all, set before the glue.
     const std::string sequence = slurp(sequence_file);
     EXPECT_TRUE(

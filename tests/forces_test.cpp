@@ -1,6 +1,7 @@
 // Cutting forces: the double reference against brute-force discs and against the closed form, OpenCL against
 // both, seams between teeth, ranges, the overhang and the deflection of a cutter.
 #include <gtest/gtest.h>
+#include <pthread.h>
 
 #include <cmath>
 #include <cstdio>
@@ -9,6 +10,8 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <system_error>
+#include <thread>
 
 #include "engine/forces/op_forces.h"
 #include "kernels/errors.h"
@@ -433,6 +436,13 @@ TEST(HardestCuts, AreTheSameWithADeviceAndWithout) {
     EXPECT_TRUE(without.device.empty());
     ASSERT_EQ(with.groups.size(), starts.size() - 1);
     EXPECT_EQ(with.groups, without.groups);
+    // A solver that has no device leaves all of it to the double model, and says why.
+    ForceSolver reference(context, "reference");
+    const HardestSearch fallen_back = hardest_cuts(context, cuts, starts, &reference);
+    EXPECT_EQ(fallen_back.groups, without.groups);
+    EXPECT_EQ(fallen_back.device, "reference");
+    EXPECT_EQ(fallen_back.note, reference.note());
+    EXPECT_EQ(with.note, ahead.solver()->on_device() ? "" : ahead.solver()->note());
     for (std::size_t g = 0; g + 1 < starts.size(); ++g) {
         double most = 0;
         for (std::size_t i = starts[g]; i < starts[g + 1]; ++i)
@@ -467,6 +477,44 @@ TEST(SolverAhead, ThrowsWhatOpeningOneThrew) {
     EXPECT_THROW((void)ahead.solver(), Error);
     SolverAhead unasked(context, 0);  // what was opened and not asked for is let go
     unasked.expect(std::vector<CutSegment>(1, slot_of_luo()));
+}
+
+// Threads of the default size cannot begin while this lives: their stacks would be larger than memory can be.
+class NoThreadBegins {
+public:
+    NoThreadBegins() {
+        pthread_getattr_default_np(&kept_);
+        pthread_attr_t vast;
+        pthread_attr_init(&vast);
+        pthread_attr_setstacksize(&vast, std::size_t{1} << 50);
+        pthread_setattr_default_np(&vast);
+        pthread_attr_destroy(&vast);
+    }
+    ~NoThreadBegins() {
+        pthread_setattr_default_np(&kept_);
+        pthread_attr_destroy(&kept_);
+    }
+    NoThreadBegins(const NoThreadBegins&) = delete;
+    NoThreadBegins& operator=(const NoThreadBegins&) = delete;
+
+private:
+    pthread_attr_t kept_{};
+};
+
+TEST(SolverAhead, OpensOneWhereItIsAskedForIfThereIsNoThread) {
+    const std::vector<CutSegment> cuts(1, slot_of_luo());
+    Context context, wrong({.device = "no such device"});
+    SolverAhead ahead(context, 0), fails(wrong, 0);
+    {
+        const NoThreadBegins none;
+        ASSERT_THROW(std::thread([] {}).join(), std::system_error);
+        ASSERT_NO_THROW(ahead.expect(cuts));
+        ASSERT_NO_THROW(fails.expect(cuts));
+    }
+    ForceSolver* const solver = ahead.solver();
+    ASSERT_NE(solver, nullptr);
+    EXPECT_EQ(solver->device(), ForceSolver(context).device());
+    EXPECT_THROW((void)fails.solver(), Error);
 }
 
 TEST(PeakForce, IsThatOfTheClosedFormOrTheReference) {

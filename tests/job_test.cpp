@@ -343,6 +343,13 @@ TEST(Job, ValidateRefusesWhatNoMachineHas) {
     EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].stepover = 1.1; }));
     EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].flutes = 0; }));
     EXPECT_FALSE(is_valid([](Job& j) { j.tools[2].flute_length = 5; })) << "no layer is left";
+    EXPECT_TRUE(is_valid([](Job& j) { j.prepare.skin_normal = {0, 0, 2}; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.prepare.skin_normal = {0, 0, 0}; })) << "no direction";
+    EXPECT_FALSE(is_valid([](Job& j) { j.prepare.skin_normal = {0, 1}; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.prepare.skin_normal = {0, 0, 1e7}; }));
+    EXPECT_TRUE(is_valid([](Job& j) { j.prepare.skin_box = {0, 0, 0, 1, 1, 0}; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.prepare.skin_box = {0, 2, 0, 1, 1, 0}; })) << "the wrong way round";
+    EXPECT_FALSE(is_valid([](Job& j) { j.prepare.skin_box = {0, 0, 0, 1}; }));
     // What would never end, or divide by a step of nothing.
     EXPECT_FALSE(is_valid([](Job& j) { j.tolerances.gouge = 1e-10; }));
     EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].stepdown_max = 1e-9, j.tools[1].stepdown_min = 0; }));

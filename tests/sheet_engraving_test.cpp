@@ -238,7 +238,7 @@ TEST(SheetEngraving, ProofFindsWhatIsWrongInARoutersText) {
     const std::string moved = late[0].substr(first, next - first);
     late[0].erase(first, next - first);
     const std::size_t m5 = late[0].rfind("M5\n");
-    late[0].insert(m5, "M5\nT2 M6\nG43 H2\nS18000 M3\n" + moved);
+    late[0].insert(m5, "M5\nT2 M6\nG43 H2\nS18000 M3\nG4 P3\nG0 Z5\n" + moved);
     EXPECT_EQ(changed.says(late), "sheets.engraving");
 }
 

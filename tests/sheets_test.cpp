@@ -92,7 +92,7 @@ TEST(Sheets, ProofFindsWhatIsWrongInTheText) {
     // A piece that is nowhere.
     std::vector<std::string> fewer(good.begin(), good.end() - 1);
     if (good.size() > 1) has(fewer, "sheets.stack");
-    // A point of the last loop moved into the part.
+    // A point of the last loop moved into the part, at every depth.
     std::vector<std::string> dented = good;
     const std::size_t last = dented[0].rfind("G0 Z5\n");
     std::size_t line = last;
@@ -104,7 +104,10 @@ TEST(Sheets, ProofFindsWhatIsWrongInTheText) {
         cx += h.x / static_cast<double>(read.ways.back().points.size());
         cy += h.y / static_cast<double>(read.ways.back().points.size());
     }
-    dented[0].replace(line + 1, end - line - 1, "X" + std::to_string(cx) + " Y" + std::to_string(cy));
+    const std::string was = dented[0].substr(line, end - line + 1),
+                      middle = "\nX" + std::to_string(cx) + " Y" + std::to_string(cy) + '\n';
+    for (std::size_t at = 0; (at = dented[0].find(was, at)) != std::string::npos; at += middle.size())
+        dented[0].replace(at, was.size(), middle);
     has(dented, "sheets.gouge");
     const auto refuses = [&](const std::string& from, const std::string& to, const char* code) {
         try {

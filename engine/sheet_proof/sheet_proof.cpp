@@ -28,6 +28,7 @@ constexpr int kHeights = 9;  ///< at which a sheet is looked at: the middles of 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kFinestTurn = 1.5;  ///< degrees of the head between two places that are looked at
 constexpr double kArcTolerance = 0.002;
+constexpr double kThrough = 0.002;  ///< mm above the bottom at which a routed cut still counts as through
 
 /// The places of a way between its points too: x, y, A and C all change evenly along a move.
 std::vector<ReadHead> fine(const std::vector<ReadHead>& points) {
@@ -181,12 +182,11 @@ private:
             is_same = is_same && std::all_of(way.heads.begin(), way.heads.end(),
                                              [](const ReadHead& head) { return head.a == 0; });
             is_same = is_same && (!program_.is_routed || way.read->deepest >= program_.thickness);
-            if (program_.is_routed && way.read->deepest < depth) {
+            if (program_.is_routed && way.read->deepest < program_.thickness - kThrough)
                 violate("sheets.depth",
                         fmt::format("the cut of line {} ends {:.3f} mm above the sheet's bottom",
                                     way.read->line, program_.thickness - way.read->deepest));
-                continue;
-            }
+            if (program_.is_routed && way.read->deepest < depth) continue;
             taken.push_back(swept(at_depth(own_frame(way), depth),
                                   std::max(0.0, program_.kerf - 2 * depth * program_.taper)));
         }

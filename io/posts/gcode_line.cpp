@@ -44,7 +44,7 @@ public:
             if (is_blank(c)) {
                 ++at_;
             } else if (c == ';' && dialect_.semicolon) {
-                check_comment(text_.substr(at_ + 1));
+                check_comment(text_.substr(at_ + 1), place_);
                 break;
             } else if (c == '%' && dialect_.percent != Dialect::Percent::none) {
                 if (text_.find_first_not_of(" \t%") != std::string_view::npos)
@@ -68,26 +68,8 @@ private:
         const std::string_view inside = text_.substr(at_ + 1, close - at_ - 1);
         if (inside.find('(') != std::string_view::npos)
             place_.fail("gcode.comment", "a comment within a comment");
-        check_comment(inside);
+        check_comment(inside, place_);
         at_ = close + 1;
-    }
-
-    /// "(MSG, …)", "(LOGOPEN, …)", ";py, …": LinuxCNC acts on a comment that begins with a word and a comma.
-    void check_comment(std::string_view comment) const {
-        std::size_t i = 0;
-        while (i < comment.size() && is_blank(comment[i])) ++i;
-        const std::size_t word = i;
-        while (i < comment.size() && (is_letter(comment[i]) || comment[i] == '_')) ++i;
-        const std::string_view name = comment.substr(word, i - word);
-        while (i < comment.size() && is_blank(comment[i])) ++i;
-        const bool sets_off = i < comment.size() && comment[i] == ',';
-        std::string known(name);
-        std::transform(known.begin(), known.end(), known.begin(), upper);
-        if (!name.empty() && (sets_off || known == "PROBEOPEN" || known == "PROBECLOSE" ||
-                              known == "LOGOPEN" || known == "LOGCLOSE" || known == "LOGAPPEND"))
-            place_.fail("gcode.comment",
-                        fmt::format("a comment that the control may act on ({})", std::string(name)),
-                        "take the comma or the comment out");
     }
 
     void word() {
@@ -172,6 +154,23 @@ private:
 };
 
 }  // namespace
+
+void check_comment(std::string_view inside, const GcodePlace& place) {
+    std::size_t i = 0;
+    while (i < inside.size() && is_blank(inside[i])) ++i;
+    const std::size_t word = i;
+    while (i < inside.size() && (is_letter(inside[i]) || inside[i] == '_')) ++i;
+    const std::string_view name = inside.substr(word, i - word);
+    while (i < inside.size() && is_blank(inside[i])) ++i;
+    const bool sets_off = i < inside.size() && inside[i] == ',';
+    std::string known(name);
+    std::transform(known.begin(), known.end(), known.begin(), upper);
+    if (!name.empty() && (sets_off || known == "PROBEOPEN" || known == "PROBECLOSE" || known == "LOGOPEN" ||
+                          known == "LOGCLOSE" || known == "LOGAPPEND"))
+        place.fail("gcode.comment",
+                   fmt::format("a comment that the control may act on ({})", std::string(name)),
+                   "take the comma or the comment out");
+}
 
 /// A NUL hides the rest of a line from LinuxCNC; letters beyond ASCII look like others.
 void check_characters(std::string_view& line, const GcodePlace& place, const Dialect& dialect) {

@@ -92,6 +92,10 @@ void read_gcode_line(std::string_view line, const GcodePlace& place, const Diale
 /// its end is cut off. @throws Error(verification): gcode.line_length, gcode.character
 void check_characters(std::string_view& line, const GcodePlace& place, const Dialect& dialect);
 
+/// What LinuxCNC or Mach would act on, of a comment without its brackets: "MSG, …", "LOGOPEN, …", any word
+/// and a comma. @throws Error(verification, "gcode.comment")
+void check_comment(std::string_view inside, const GcodePlace& place);
+
 /// A G or M number as it is written: 431 is "43.1".
 [[nodiscard]] std::string gcode_number(int tenths);
 

@@ -7,8 +7,12 @@
 #include <charconv>
 #include <cmath>
 #include <numbers>
+#include <span>
+#include <vector>
 
 #include "engine/sheets/sheet_plan.h"
+#include "io/posts/dialect.h"
+#include "io/posts/gcode_line.h"
 #include "kernels/errors.h"
 
 namespace slabwright {
@@ -16,7 +20,34 @@ namespace slabwright {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kAtTop = 1e-3;  ///< mm: heights are written in steps
+constexpr double kAtTop = 1e-3;         ///< mm: heights are written in steps
+constexpr double kLeastSpinUp = 1;      ///< s of dwell that a router's spindle is given
+constexpr double kMostBlending = 0.01;  ///< mm by which a control may round corners (G64 P)
+
+/// What words of a group change: one of each may stand in a line, and all but the first and the last must be
+/// stated before the head moves.
+enum Group : unsigned {
+    kMotion,
+    kPlane,
+    kUnits,
+    kDistances,
+    kFeedMode,
+    kRadius,
+    kLength,
+    kPath,
+    kFrame,
+    kDwell
+};
+constexpr unsigned kHead = 1u << kPlane | 1u << kUnits | 1u << kDistances | 1u << kFeedMode | 1u << kRadius |
+                           1u << kLength | 1u << kPath | 1u << kFrame;
+struct KnownWord {
+    double number;
+    Group group;
+};
+constexpr KnownWord kKnownWords[] = {{0, kMotion},  {1, kMotion},     {80, kMotion},   {17, kPlane},
+                                     {21, kUnits},  {90, kDistances}, {93, kFeedMode}, {94, kFeedMode},
+                                     {40, kRadius}, {43, kLength},    {49, kLength},   {64, kPath},
+                                     {54, kFrame},  {4, kDwell}};
 
 /// Reads one program line by line.
 class SheetReader {
@@ -25,7 +56,7 @@ public:
 
     void line(std::string_view text, std::uint32_t number) {
         number_ = number;
-        if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
+        check_characters(text, {program_.file, number_}, dialect_);
         if (ended_ && !text.empty()) fail("gcode.after_end", "words after the program's end");
         if (!text.empty() && text.front() == '(') comment(text);
         else if (!text.empty()) words(text);
@@ -34,6 +65,7 @@ public:
     ReadSheetProgram take() {
         if (!has_stock_) fail("gcode.no_stock", "no comment says which stock it is for");
         if (!ended_) fail("gcode.no_end", "the program ends without M2");
+        require_alike_depths();
         return std::move(program_);
     }
 
@@ -65,7 +97,9 @@ private:
     }
 
     void comment(std::string_view text) {
-        if (text.back() != ')') fail("gcode.comment", "a comment that does not end in its line");
+        if (text.find_first_of("()", 1) != text.size() - 1)
+            fail("gcode.comment", "a comment that is not all of its line");
+        check_comment(text.substr(1, text.size() - 2), {program_.file, number_});
         const auto w = split(text.substr(1, text.size() - 2));
         const auto value = [&](std::size_t i) { return number_of(w[i]); };
         const auto whole = [&](std::size_t i) {
@@ -168,8 +202,10 @@ private:
 
     struct Block {
         double x = 0, y = 0, z = 0, a = 0, c = 0;
-        double feed = -1, tool = -1, length = -1;
+        double feed = -1, tool = -1, length = -1, p = -1;
         bool moves = false, moves_z = false, changes = false, offsets = false;
+        std::uint32_t letters = 0;  ///< that stand in it, G aside
+        unsigned groups = 0;        ///< of its G words
     };
 
     void words(std::string_view text) {
@@ -178,6 +214,7 @@ private:
         if (std::find(beside_.begin(), beside_.end(), text) != beside_.end()) return;
         Block block{x_, y_, z_, a_, c_};
         for (const std::string_view word : split(text)) take(word, block);
+        check_numbers(block);
         if (block.changes || block.offsets) change_tool(block);
         if (block.feed >= 0 && !(block.feed > 0)) fail("gcode.feed", "a feed of nothing");
         if (block.feed > 0) feed_ = block.feed;
@@ -186,12 +223,29 @@ private:
         if (block.moves || block.moves_z) motion(block.x, block.y, block.z, block.a, block.c);
     }
 
+    /// What belongs to a G word stands beside it, and nothing else does.
+    void check_numbers(const Block& block) {
+        const bool dwells = (block.groups >> kDwell & 1u) != 0, blends = (block.groups >> kPath & 1u) != 0;
+        if (dwells && !(block.p >= 0)) fail("gcode.dwell", "a dwell without its time");
+        if (dwells && on_ && (!program_.is_routed || block.p >= kLeastSpinUp)) is_ready_ = true;
+        if (blends && !(block.p >= 0 && block.p <= kMostBlending))
+            fail("gcode.path_mode", fmt::format("corners may be rounded by more than {} mm", kMostBlending));
+        if ((block.letters >> ('P' - 'A') & 1u) != 0 && !dwells && !blends)
+            fail("gcode.unused_word", "a P that belongs to no word");
+        if (block.length >= 0 && !block.offsets) fail("gcode.unused_word", "an H that belongs to no word");
+    }
+
     void take(std::string_view word, Block& block) {
         const double v = number_of(word.substr(1));
+        if (word[0] >= 'A' && word[0] <= 'Z' && word[0] != 'G') {
+            const std::uint32_t letter = 1u << (word[0] - 'A');
+            if ((block.letters & letter) != 0)
+                fail("gcode.twice", std::string("two words ") + word[0] + " in a line");
+            block.letters |= letter;
+        }
         switch (word[0]) {
             case 'G':
-                g(v);
-                block.offsets = block.offsets || v == 43;
+                g(v, block);
                 break;
             case 'M':
                 m(v);
@@ -222,9 +276,12 @@ private:
                 block.length = v;
                 break;
             case 'S':
+                if (!(v > 0))
+                    fail(program_.is_routed ? "gcode.spindle" : "gcode.power", "a speed or power of nothing");
                 power_ = v;
                 break;
             case 'P':
+                block.p = v;
                 break;
             default:
                 fail("gcode.unknown_word", std::string("no word ") + word[0] + " is known here");
@@ -235,9 +292,11 @@ private:
         if (block.changes) {
             if (!program_.is_routed) fail("gcode.unknown_word", "M6, and only a router changes its tool");
             if (z_ < 0) fail("gcode.tool", "a tool change with the cutter in the sheet");
+            if (on_) fail("gcode.spindle", "a tool change with the spindle on");
             if (block.tool < 1) fail("gcode.tool", "a tool change that names no tool");
             tool_ = static_cast<int>(block.tool);
             has_length_ = on_ = false;
+            z_ = NAN;
         }
         if (!block.offsets) return;
         if (block.length != tool_)
@@ -246,23 +305,46 @@ private:
     }
 
     void motion(double x, double y, double z, double a, double c) {
-        if (!is_set_) fail("gcode.unset", "a motion before units, plane and distances are stated");
+        if (!is_set_)
+            fail("gcode.unset",
+                 "a motion before G17, G21, G40, G49, G54, G64, G90 and G94 have all been stated");
+        if (!has_mode_) fail("gcode.unset", "a motion, and neither G0 nor G1 is in force");
+        if (std::isnan(z)) fail("gcode.start", "a motion sideways before the height is stated");
+        const bool is_sideways = (x != x_ && !std::isnan(x)) || (y != y_ && !std::isnan(y));
+        if (is_sideways && std::isnan(z_))
+            fail("gcode.start", "a motion sideways from a height that is not known");
+        if (!rapid_ && (std::isnan(x) || std::isnan(y) || std::isnan(z_)))
+            fail("gcode.start", "a cut from a place that is not known");
         if (!rapid_ && !(feed_ > 0)) fail("gcode.feed", "a cut without a feed");
         if (program_.is_routed && !has_length_)
             fail("gcode.tool_length", "a motion without the tool's length");
         const bool cuts = program_.is_routed ? z < 0 || z_ < 0 : on_;
         if (cuts && rapid_ && !(program_.is_routed && x == x_ && y == y_ && z >= z_))
             fail("gcode.rapid", "a rapid that cuts");
-        if (cuts && !on_) fail("gcode.spindle", "a cut with the spindle at rest");
-        if (cuts && !program_.is_routed && std::abs(z + pivot_ * (1 - std::cos(a * kDegree))) > kAtTop)
+        if (cuts && (!on_ || (program_.is_routed && power_ == 0)))
+            fail("gcode.spindle", "a cut with the spindle at rest");
+        if (cuts && program_.is_routed && !is_ready_)
+            fail("gcode.spin_up", "a cut before the spindle was given time to start (G4 P)");
+        if (cuts && !program_.is_routed && !is_ready_ && !is_engraving_)
+            fail("gcode.dwell", "a cut without a dwell where it pierces");
+        if (!cuts && !program_.is_routed && is_sideways && !(tip_height(z_, a_) > kAtTop))
+            fail("gcode.rapid", "a motion over the sheet with the head down");
+        if (!cuts && !rapid_ && is_sideways)
+            fail("gcode.air", "a motion that should cut and stays above the sheet, or has its head off");
+        if (cuts && !program_.is_routed && std::abs(tip_height(z, a)) > kAtTop)
             fail("gcode.height", "the jet is on away from the sheet's top");
         if (program_.is_routed && (a != 0 || c != 0)) fail("gcode.head", "a router's head that leans");
         if (!(a >= 0) || a >= 85) fail("gcode.head", "the head leans to an angle that it cannot have");
-        if (program_.is_routed && z < 0 && z_ >= 0) begin(x_, y_, a_, c_);
+        if (program_.is_routed && z < 0 && !(z_ < 0)) begin(x_, y_, a_, c_);
         x_ = x, y_ = y, z_ = z, a_ = a, c_ = c;
         if (!cuts || (program_.is_routed && rapid_)) return;  // or out of the sheet
         if (is_engraving_) engraved(head_at(x, y, a, c), z);
         else cut(head_at(x, y, a, c), z);
+    }
+
+    /// mm of a jet's tip over the sheet.
+    [[nodiscard]] double tip_height(double z, double a) const {
+        return z + pivot_ * (1 - std::cos(a * kDegree));
     }
 
     /// The head by where its axis meets the sheet's top, from where its pivot is.
@@ -280,6 +362,22 @@ private:
             fail("gcode.pivot", "the head turns so far in one move that its tip leaves the line");
     }
 
+    /// A depth's points, less its way back to where it went in.
+    static std::span<const ReadHead> there(const std::vector<ReadHead>& points) {
+        const bool is_back =
+            points.size() > 1 && points.back().x == points[0].x && points.back().y == points[0].y;
+        return {points.data(), points.size() - (is_back ? 1 : 0)};
+    }
+
+    /// The proof looks at the last depth of a cut; those before it go the same way.
+    void require_alike_depths() const {
+        if (depth_before_.empty()) return;
+        const auto before = there(depth_before_), last = there(program_.ways.back().points);
+        if (!std::equal(before.begin(), before.end(), last.begin(), last.end(),
+                        [](const ReadHead& p, const ReadHead& q) { return p.x == q.x && p.y == q.y; }))
+            fail("gcode.depths", "two depths of a cut go other ways");
+    }
+
     void cut(const ReadHead& head, double z) {
         if (const auto& engraver = program_.engraver; engraver) {
             if (program_.is_routed && tool_ == engraver->tool && engraver->width != program_.kerf)
@@ -295,6 +393,10 @@ private:
             if (std::hypot(head.x - way.points[0].x, head.y - way.points[0].y) > 1e-9)
                 fail("gcode.plunge", "the cutter goes deeper beside where it went in");
             way.deepest = -z;
+            if (way.points.size() > 1) {
+                require_alike_depths();
+                depth_before_ = way.points;
+            }
             way.points.resize(1);
             return;
         }
@@ -318,8 +420,11 @@ private:
 
     void switched(bool on) {
         if (on && on_) fail("gcode.switch", "the head is switched on twice");
+        if (on && (std::isnan(x_) || std::isnan(y_) || std::isnan(z_)))
+            fail("gcode.start", "a cut from a place that is not known");
         if (on) begin(x_, y_, a_, c_);
         on_ = on;
+        is_ready_ = false;
     }
 
     void begin(double x, double y, double a, double c) {
@@ -328,46 +433,60 @@ private:
             return;
         }
         if (!named_) fail("gcode.unnamed", "a cut that no comment names");
+        require_alike_depths();
+        depth_before_.clear();
         named_ = false;
         next_.points = {head_at(x, y, a, c)};
         program_.ways.push_back(next_);
     }
 
-    void g(double v) {
-        static constexpr double known[] = {4, 17, 21, 40, 43, 49, 54, 64, 80, 90};
-        if (v == 0) rapid_ = true;
-        else if (v == 1) rapid_ = false;
-        else if (v == 93) inverse_ = true;
-        else if (v == 94) inverse_ = false;
-        else if (std::find(std::begin(known), std::end(known), v) == std::end(known))
+    void g(double v, Block& block) {
+        const KnownWord* known = std::find_if(std::begin(kKnownWords), std::end(kKnownWords),
+                                              [&](const KnownWord& word) { return word.number == v; });
+        if (known == std::end(kKnownWords))
             fail("gcode.unknown_word", fmt::format("G{} is none of these programs' words", v));
-        if (v == 21) has_mm_ = true;
-        if (v == 90) has_absolute_ = true;
-        is_set_ = has_mm_ && has_absolute_;
+        const unsigned group = 1u << known->group;
+        if ((block.groups & group) != 0)
+            fail("gcode.twice", fmt::format("G{} beside another word for the same in a line", v));
+        block.groups |= group;
+        stated_ |= group;
+        is_set_ = (stated_ & kHead) == kHead;
+        if (known->group == kMotion) has_mode_ = v != 80, rapid_ = v == 0;
+        if (known->group == kFeedMode) inverse_ = v == 93;
+        if (v == 43) block.offsets = true;
+        if (v == 49) has_length_ = false;
     }
 
     void m(double v) {
         if (v == 2) {
             if (on_ && !program_.is_routed) fail("gcode.left_on", "the program ends with the jet on");
+            if (z_ < 0 && program_.is_routed)
+                fail("gcode.left_on", "the program ends with the cutter in the sheet");
             ended_ = true;
         } else if (program_.is_routed && (v == 3 || v == 5)) {
+            if (v == 5 && z_ < 0) fail("gcode.spindle", "the spindle stops with the cutter in the sheet");
             on_ = v == 3;
+            is_ready_ = false;
         } else if (v != 6) {
             fail("gcode.unknown_word", fmt::format("M{} is none of these programs' words", v));
         }
     }
 
+    const Dialect dialect_ = dialect_of(Post::linuxcnc);
     ReadSheetProgram program_;
     ReadWay next_;
+    std::vector<ReadHead> depth_before_;  // of the last way
     std::uint32_t number_ = 0;
-    double x_ = 0, y_ = 0, z_ = 1e9, a_ = 0, c_ = 0, feed_ = 0, power_ = 0;
+    double x_ = NAN, y_ = NAN, z_ = NAN;  // until they are stated; Z again after a tool change
+    double a_ = 0, c_ = 0, feed_ = 0, power_ = 0;
     double pivot_ = 0;  // mm
     int tool_ = 0;
     std::string on_text_ = "M3", off_text_ = "M5";
     std::vector<std::string> beside_;
     bool has_stock_ = false, ended_ = false, named_ = false, rapid_ = true, on_ = false, inverse_ = false;
-    bool has_mm_ = false, has_absolute_ = false, is_set_ = false, has_length_ = false;
-    bool is_engraving_ = false;
+    unsigned stated_ = 0;  // groups
+    bool has_mode_ = false, is_set_ = false, has_length_ = false;
+    bool is_engraving_ = false, is_ready_ = false;
 };
 
 }  // namespace

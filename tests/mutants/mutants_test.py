@@ -116,6 +116,26 @@ again = run("--again", "--work", str(root / "again"))
 expect("kernels/area.cpp:6\t7 to 8\treturn a - 7;\tsurvived\t1 tests: area_test" in again, f"a change that nothing looks at\n{again}")
 expect("kernels/area.cpp:6\t- to +\treturn a - 7;\tkilled" in again, f"a listed change that a test notices\n{again}")
 expect(again.rstrip().splitlines()[-1] == "killed 1 of 2 (50.0 %)", f"the sum of those again\n{again}")
+# ---- A ledger: what was killed stands in it too, files that it names are passed over, verdicts of the list count
+ledger = root / "ledger.tsv"
+run("--seed", "3", "--count", "1", "--only", "kernels/area.h", "--ledger", str(ledger), "--work", str(root / "kept"))
+expect(ledger.read_text().startswith("place\tchange\tline\toutcome\tby\nkernels/area.h:4\t"), f"the ledger\n{ledger.read_text()}")
+fresh = run("--list", "--seed", "3", "--count", "9", "--new-files", "--ledger", str(ledger))
+expect(fresh == "", f"files that the list or the ledger names are drawn from again\n{fresh}")
+survivor.write_text("place\tchange\tline\tverdict\n")
+fresh = run("--list", "--seed", "3", "--count", "9", "--new-files", "--ledger", str(ledger))
+expect(fresh.count("\n") == 1 and fresh.startswith("kernels/area.cpp:"), f"one line in each new file\n{fresh}")
+survivor.write_text("place\tchange\tline\tverdict\nio/b.cpp:1\t0 to 1\tb = 0;\tkilled by b_test: B.B\n"
+                    "io/b.cpp:1\t1 to 0\tb = 1;\tequal: by decree\nio/b.cpp:1\t2 to 3\tb = 2;\topen: for now\n")
+ledger.write_text("place\tchange\tline\toutcome\tby\n" + "".join(f"io/b.cpp:9\t{change}\tb = {change[0]};\tsurvived\t1 tests: b\n"
+                                                                 for change in ("0 to 1", "1 to 0", "2 to 3", "2 to 3", "3 to 4"))
+                  + "io/a.cpp:1\t0 to 1\ta = 0;\tkilled\tb_test: B.B\n")
+told = run("--score", str(ledger))
+expect("| io | 2 | 5 | 1 | 1 | 1 | 2 | 50.0 % |" in told and "| kernels | 0 | 0 |" in told, f"a ledger's score\n{told}")
+ledger.write_text(ledger.read_text() + "io/a.cpp:1\t0 to 1\n")
+bad = subprocess.run([str(script), "--root", str(root), "--score", str(ledger)], capture_output=True, text=True)
+expect(bad.returncode == 2 and ":8 is no line" in bad.stderr, f"a line that is none: {bad.returncode} {bad.stderr}")
+
 (root / "kernels/area.cpp").write_text(before + "int broken(\n")
 broken = subprocess.run([str(script), "--root", str(root), "--build", str(root / "build")], capture_output=True, text=True)
 expect(broken.returncode == 2 and "do not build" in broken.stderr, f"code that does not build: {broken.returncode} {broken.stderr}")
@@ -126,6 +146,12 @@ for place, change, line, verdict in mutants.read_list(kept):
     file = place.rsplit(":", 1)[0]
     expect((source / file).exists(), f"{kept}: {file} is gone; strike its rows")
     expect(verdict.startswith(("equal: ", "killed by ", "open: ")) and len(verdict) > 12, f"{kept}: {place} has the verdict {verdict!r}")
+
+# ---- Refusals that no test reaches: each is a line that still stands, with a reason
+for row in (source / "tests/unreached_errors.tsv").read_text().splitlines()[1:]:
+    file, line, why = row.split("\t")
+    stands = any(text.strip() == line for text in (source / file).read_text().splitlines()) if (source / file).exists() else False
+    expect(stands and len(why) > 12, f"tests/unreached_errors.tsv: {file}: {line}: the line is gone, or has no reason")
 
 print(f"{failures} failed")
 sys.exit(1 if failures else 0)
