@@ -245,10 +245,12 @@ TEST_F(TwoSided, CommandsThatDoNotKnowItSaySo) {
     const support::CommandResult resumed = told({"resume", built_->out});
     EXPECT_EQ(resumed.exit, 2) << resumed.err;
     EXPECT_NE(resumed.err.find("both sides"), std::string::npos) << resumed.err;
-    const support::CommandResult without_dowels =
+    // The option brings two dowels a joint with it; those of 8 mm are too narrow for the fixed library.
+    const support::CommandResult other =
         told({"plan", built_->stl, "--sides", "two", "-o", built_->folder / "other"});
-    EXPECT_EQ(without_dowels.exit, 2) << without_dowels.err;
-    EXPECT_NE(without_dowels.err.find("dowels.per_joint"), std::string::npos) << without_dowels.err;
+    EXPECT_EQ(other.exit, 2) << other.err;
+    EXPECT_NE(other.err.find("or take dowels.diameter = 18, whose holes T2 makes"), std::string::npos)
+        << other.err;
     const support::CommandResult alone = told({"verify", built_->undersides.at(0)});
     EXPECT_NE(alone.exit, 0);
     EXPECT_NE(alone.err.find("underside"), std::string::npos) << alone.err;

@@ -78,6 +78,8 @@ Job job_of(const Options& options) {
     put("bonding.accept_weak", options.accept_weak ? "true" : "");
     word("layers.strategy", options.strategy);
     word("layers.sides", options.sides);
+    const bool two_sided = !options.sides.empty() && options.sides != "one";
+    put("dowels.per_joint", two_sided && job.dowels.per_joint == 0 ? "2" : "");
     word("layers.finder", options.finder);
     put("tolerances.weld", options.weld_given ? fmt::format("{}", options.weld) : "");
     keys += prepare_keys(options.prepare);
@@ -378,9 +380,11 @@ CLI::App* add_plan_command(CLI::App& app, Options& options) {
     command->add_option("--strategy", options.strategy, "of layer placement: optimal, printed or combined")
         ->check(CLI::IsMember({"optimal", "printed", "combined"}));
     command
-        ->add_option("--sides", options.sides,
-                     "of slabs that are milled: one, the top; two, the underside too where there are "
-                     "overhangs; or auto, two where that makes more")
+        ->add_option(
+            "--sides", options.sides,
+            "of slabs that are milled: one, the top; two, the underside too where there are "
+            "overhangs; or auto, two where that makes more. Not one: two dowels in a joint where the "
+            "job gives none")
         ->check(CLI::IsMember({"one", "two", "auto"}));
     command->add_option("--finder", options.finder, "of features: exact, halving or both")
         ->check(CLI::IsMember({"exact", "halving", "both"}));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "engine/moves/path_builder.h"
@@ -21,6 +22,27 @@ bool reaches(const Job& job, const Tool& tool, double depth) {
     return tool.flute_length >= deep && tool.stickout - job.cutting.holder_clearance >= deep;
 }
 
+/// The tool of the library that makes dowel holes as wide and as deep, mm: a drill, else the widest end mill
+/// that bores them. None: nullptr.
+const Tool* maker_of(const Job& job, double hole, double depth) {
+    const Tool* widest = nullptr;
+    for (const Tool& tool : job.tools) {
+        if (!reaches(job, tool, depth)) continue;
+        if (tool.kind == ToolKind::drill && std::abs(tool.diameter - hole) <= kSameDowel) return &tool;
+        if (can_bore(tool, hole) && (widest == nullptr || tool.diameter > widest->diameter)) widest = &tool;
+    }
+    return widest;
+}
+
+/// Which dowels of those that shops keep (DIN 68150-1) the library has a tool for, in words; "" for none.
+std::string dowels_that_can_be(const Job& job, double depth) {
+    for (const double diameter : {8, 10, 6, 12, 14, 16, 18, 20, 5})
+        if (const Tool* const tool = maker_of(job, diameter, depth))
+            return fmt::format("; or take dowels.diameter = {}, whose holes T{} makes", diameter,
+                               tool->number);
+    return "";
+}
+
 }  // namespace
 
 double point_below(const Tool& tool) {
@@ -29,18 +51,12 @@ double point_below(const Tool& tool) {
 
 const Tool& dowel_tool(const Job& job, double depth) {
     const double hole = job.dowels.diameter;
-    const Tool* widest = nullptr;
-    for (const Tool& tool : job.tools) {
-        if (!reaches(job, tool, depth)) continue;
-        if (tool.kind == ToolKind::drill && std::abs(tool.diameter - hole) <= kSameDowel) return tool;
-        if (can_bore(tool, hole) && (widest == nullptr || tool.diameter > widest->diameter)) widest = &tool;
-    }
-    if (widest != nullptr) return *widest;
+    if (const Tool* const tool = maker_of(job, hole, depth)) return *tool;
     throw Error(ErrorKind::usage, "dowel.tool",
                 fmt::format("no tool makes dowel holes of {:g} mm, {:.1f} mm deep", hole, depth), "tool",
                 fmt::format("add a drill of {0:g} mm with flutes and stick-out for that depth, or a flat end "
-                            "mill between {1:g} and {0:g} mm, narrower by more than its core_diameter",
-                            hole, hole / 2));
+                            "mill between {1:g} and {0:g} mm, narrower by more than its core_diameter{2}",
+                            hole, hole / 2, dowels_that_can_be(job, depth)));
 }
 
 Operation dowel_holes(const Job& job, const Layer& layer, const Tool& tool) {
