@@ -206,6 +206,7 @@ struct Prices {
     double base_board_m2 = 0;      ///< of the board under the first layer
     double glue_kg = 0;
     double machine_hour = 0;  ///< of the whole build, bonding included
+    double dowel = 0;         ///< of one dowel
 };
 
 struct Tolerances {

@@ -133,6 +133,7 @@ void validate_prices(const Prices& p, const Slabs& s) {
     require("prices.base_board_m2", p.base_board_m2, 0, 1e9);
     require("prices.glue_kg", p.glue_kg, 0, 1e9);
     require("prices.machine_hour", p.machine_hour, 0, 1e9);
+    require("prices.dowel", p.dowel, 0, 1e9);
 }
 
 void validate_bonding(const Bonding& b) {

@@ -314,6 +314,15 @@ TEST(CutList, ReckonsWithStatedPricesOnly) {
     EXPECT_NEAR(cost()->total, 12.5 + 9 + 0.6 + 45, 1e-9);
     EXPECT_EQ(cost_text(job, cost()),
               "cost    67.10 EUR (boards 12.50, base board 9.00, glue 0.60, machine 45.00)\n");
+    job.prices.dowel = 0.2;
+    EXPECT_FALSE(cost()->dowels) << "the build has none";
+    Plan with = stack(job, blanks);
+    with.layers[0].dowels.resize(3);
+    const Cost dowelled = cost_of(job, amounts_of(with, cut_list(with))).value();
+    EXPECT_NEAR(dowelled.dowels.value(), 0.6, 1e-9);
+    EXPECT_NEAR(dowelled.total, cost()->total + 0.6, 1e-9);
+    EXPECT_EQ(cost_text(job, dowelled),
+              "cost    67.70 EUR (boards 12.50, base board 9.00, glue 0.60, machine 45.00, dowels 0.60)\n");
     job.prices.board_m2 = {1, 2};
     EXPECT_THROW(validate(job), Error) << "two prices for one thickness";
     job.slabs.thicknesses = {12, 19};

@@ -108,6 +108,7 @@ std::string with_words(const std::string& program, char letter, const std::funct
 TEST(DowelPlans, ArePlannedProvenAndTold) {
     Job job = with_dowels(2);
     job.dowels.clearance = 6;
+    job.prices.dowel = 0.25;
     const Built built(stl_bytes("pump", pump_cover()), job);
     EXPECT_TRUE(built.passed);
     const json proof = json::parse(slurp(built.out + "/verify.json"));
@@ -170,6 +171,7 @@ TEST(DowelPlans, ArePlannedProvenAndTold) {
     std::size_t circles = 0;
     for (std::size_t at = 0; (at = dxf.find("CIRCLE\n8\nDOWELS", at)) != std::string::npos; ++at) ++circles;
     EXPECT_EQ(circles, dowels);
+    EXPECT_NEAR(built.plan["cost"]["dowels"].get<double>(), 0.25 * static_cast<double>(dowels), 1e-9);
 }
 
 TEST(DowelPlans, ASpoiltHoleIsTold) {

@@ -296,6 +296,9 @@ Quote quote(Context& context, MeshView mesh, const Job& asked) {
     Amounts amounts = amounts_of(plan, result.boards);
     amounts.glue_m2 = result.glue_m2;
     amounts.minutes = result.build_minutes;
+    // As many as are asked for: places for them are found by a plan.
+    amounts.dowels =
+        (std::max<std::size_t>(layers.tops.size(), 1) - 1) * static_cast<std::size_t>(job.dowels.per_joint);
     result.cost = cost_of(job, amounts);
     return result;
 }

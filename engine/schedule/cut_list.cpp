@@ -103,8 +103,10 @@ Amounts amounts_of(const Plan& plan, const CutList& list) {
                          [&](const SawnPiece& piece) { return list.blanks[piece.piece].layer > 0; });
         amounts.boards.push_back({board.thickness, board.size.length * board.size.width * kMm2InM2, base});
     }
-    for (const Layer& layer : plan.layers)
+    for (const Layer& layer : plan.layers) {
+        amounts.dowels += layer.dowels.size();
         for (const Joint& joint : layer.joints) amounts.glue_m2 += joint.area_mm2 * kMm2InM2;
+    }
     amounts.minutes = plan.totals.build_minutes;
     return amounts;
 }
@@ -123,6 +125,8 @@ std::optional<Cost> cost_of(const Job& job, const Amounts& amounts) {
     if (job.prices.glue_kg > 0 && job.bonding.glue_g_per_m2 > 0)
         add(cost.glue, amounts.glue_m2 * job.bonding.glue_g_per_m2 * 1e-3 * job.prices.glue_kg);
     if (job.prices.machine_hour > 0) add(cost.machine, amounts.minutes / 60 * job.prices.machine_hour);
+    if (job.prices.dowel > 0 && amounts.dowels > 0)
+        add(cost.dowels, static_cast<double>(amounts.dowels) * job.prices.dowel);
     if (!stated) return std::nullopt;
     return cost;
 }

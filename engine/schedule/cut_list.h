@@ -45,6 +45,7 @@ struct Cost {
     std::optional<double> boards;      ///< whole boards as they are bought
     std::optional<double> base_board;  ///< where it is sawn from boards of its own thickness
     std::optional<double> glue, machine;
+    std::optional<double> dowels;  ///< where the build has some
     double total = 0;  ///< of what has a price
 };
 
@@ -58,6 +59,7 @@ struct Amounts {
     std::vector<Boards> boards;
     double glue_m2 = 0;
     double minutes = 0;  ///< of the whole build
+    std::size_t dowels = 0;
 };
 
 /// What a plan takes. @param list its own

@@ -366,6 +366,7 @@ void visit_price_keys(PricesLike& prices, Visit& visit) {
               "of a square metre of base board; 0: as slabs of its thickness, else not stated");
     visit.key("glue_kg", prices.glue_kg, "of a kilogram of glue; needs bonding.glue_g_per_m2");
     visit.key("machine_hour", prices.machine_hour, "of an hour of the whole build");
+    if (shows(visit, prices.dowel > 0)) visit.key("dowel", prices.dowel, "of one dowel (dowels.per_joint)");
 }
 
 /// Walks the keys of the machine, and of its probing programs where it has some.

@@ -1,8 +1,10 @@
 #include "io/write/wood_json.h"
 
-#include <array>
-
 #include <fmt/format.h>
+
+#include <optional>
+#include <utility>
+#include <vector>
 
 namespace slabwright {
 
@@ -44,12 +46,14 @@ void put_board(JsonText& json, const CutList& list, const BoardToSaw& board) {
     json.end();
 }
 
-/// Parts of a cost that have a price, in the order in which they are told.
-std::array<std::pair<const char*, std::optional<double>>, 4> parts_of(const Cost& cost) {
-    return {{{"boards", cost.boards},
-             {"base_board", cost.base_board},
-             {"glue", cost.glue},
-             {"machine", cost.machine}}};
+/// Parts of a cost, in the order in which they are told; dowels only where they have a price.
+std::vector<std::pair<const char*, std::optional<double>>> parts_of(const Cost& cost) {
+    std::vector<std::pair<const char*, std::optional<double>>> parts{{"boards", cost.boards},
+                                                                     {"base_board", cost.base_board},
+                                                                     {"glue", cost.glue},
+                                                                     {"machine", cost.machine}};
+    if (cost.dowels) parts.emplace_back("dowels", cost.dowels);
+    return parts;
 }
 
 }  // namespace

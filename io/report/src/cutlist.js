@@ -48,8 +48,8 @@ const money = value => `${value.toFixed(2)}${plan.cost.currency ? ` ${plan.cost.
 // What the build costs; null where the job states no price.
 export function costText() {
     if (!plan.cost) return null;
-    const names = {boards: 'boards', base_board: 'base board', glue: 'glue', machine: 'machine'};
-    const parts = Object.keys(names).filter(k => plan.cost[k] !== null).map(k => `${names[k]} ${money(plan.cost[k])}`);
+    const names = {boards: 'boards', base_board: 'base board', glue: 'glue', machine: 'machine', dowels: 'dowels'};
+    const parts = Object.keys(names).filter(k => typeof plan.cost[k] === 'number').map(k => `${names[k]} ${money(plan.cost[k])}`);
     return {total: money(plan.cost.total), parts: parts.join(', ')};
 }
 
