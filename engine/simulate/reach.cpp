@@ -20,44 +20,13 @@ constexpr int kRounds = 30;                 // of settling
 constexpr double kStuck = 0.99;             // of the round before: settling has ended
 constexpr std::size_t kMostPatches = 20000;  // of one tool and point; a dozen to some hundreds are usual
 
-/// An angle by its sine and cosine.
-struct Turned {
-    double sine = 0, cosine = 1;
-
-    [[nodiscard]] Turned plus(const Turned& by) const {
-        return {sine * by.cosine + cosine * by.sine, cosine * by.cosine - sine * by.sine};
-    }
-    [[nodiscard]] Turned minus(const Turned& by) const {
-        return {sine * by.cosine - cosine * by.sine, cosine * by.cosine + sine * by.sine};
-    }
-};
-Turned turned(double angle) { return {std::sin(angle), std::cos(angle)}; }
-
-/// Half a range, half of that, and so on, with their sines and cosines once they are asked for.
-class Halvings {
-public:
-    explicit Halvings(double half) : half_(half) {}
-    [[nodiscard]] double range(int k) const { return std::ldexp(half_, -k); }
-    [[nodiscard]] const Turned& turn(int k) {
-        while (static_cast<int>(turns_.size()) <= k)
-            turns_.push_back(turned(range(static_cast<int>(turns_.size()))));
-        return turns_[static_cast<std::size_t>(k)];
-    }
-
-private:
-    double half_;
-    std::vector<Turned> turns_;
-};
-
 /// All places of a tool that may be worth trying for one point: for a ball its centre on the upper half
 /// sphere about the point (lower ones are more in the way, higher ones do not cover it); for a flat end mill
 /// the middle of its floor on the disc about the point, at the point's height. A patch is a range of the
-/// polar angle, or of the distance, and one of the azimuth. Patches are halved: their angles are sums and
-/// differences of few, so that no sine is taken but of those.
+/// polar angle, or of the distance, and one of the azimuth.
 struct Patch {
-    double u;                    // middle: polar angle or distance
-    Turned polar, azimuth;       // of the middle
-    int u_halvings, v_halvings;  // of half the whole ranges
+    double u, v;    // middle: polar angle or distance, azimuth
+    double du, dv;  // half the ranges
     Point3 centre;
     double spread;   // mm: no place of the patch is farther from its centre
     double nearest;  // mm from the centre to the nearest obstacle known
@@ -203,9 +172,9 @@ public:
     Found run() {
         if (point_[2] + (ball_ ? R_ : 0) < floor_) return Found::held;
         const double u_end = ball_ ? std::acos(std::clamp((floor_ - point_[2]) / R_, 0.0, 1.0)) : R_;
-        polar_ = Halvings(u_end / 2);
         for (int k = 0; k < 3; ++k)
-            consider({u_end / 2, polar_.turn(0), turned((2 * k + 1) * std::numbers::pi / 3), 0, 0, {}, 0, 0});
+            consider(
+                {u_end / 2, (2 * k + 1) * std::numbers::pi / 3, u_end / 2, std::numbers::pi / 3, {}, 0, 0});
         int settlings = 0;
         for (std::size_t patches = 0; !heap_.empty() && patches < kMostPatches; ++patches) {
             std::pop_heap(heap_.begin(), heap_.end(), worse);
@@ -259,9 +228,8 @@ private:
 
     /// Whether shank or holder is in the way in all of a patch: even with the tip as high as the patch goes,
     /// by more than the patch's size.
-    [[nodiscard]] bool held_everywhere(const Patch& p) {
-        const double tip =
-            ball_ ? point_[2] + R_ * (p.polar.minus(polar_.turn(p.u_halvings)).cosine - 1) : point_[2];
+    [[nodiscard]] bool held_everywhere(const Patch& p) const {
+        const double tip = ball_ ? point_[2] + R_ * std::cos(p.u - p.du) - R_ : point_[2];
         for (const auto& [radius, above] : {std::pair{tool_.shank_diameter / 2, tool_.flute_length},
                                             std::pair{tool_.holder_diameter / 2, tool_.stickout}}) {
             if (radius <= R_ || above <= 0) continue;
@@ -277,27 +245,19 @@ private:
         const auto [nearest, most] = near_.distances(p.centre, p.spread);
         p.nearest = std::sqrt(nearest);
         // A flat end mill's places are up to the patch's outer edge from the point.
-        const double outer = std::min(p.u + polar_.range(p.u_halvings), R_),
-                     farther = ball_ ? 0 : outer * outer - p.u * p.u;
+        const double outer = std::min(p.u + p.du, R_), farther = ball_ ? 0 : outer * outer - p.u * p.u;
         return p.nearest + p.spread < R_ - kTouch || most + farther < (R_ - kTouch) * (R_ - kTouch);
-    }
-
-    /// How far from the axis through the point a patch goes at most, in R for a ball, else mm.
-    [[nodiscard]] double outer(const Patch& p) {
-        const double u_most = p.u + polar_.range(p.u_halvings);
-        if (!ball_) return u_most;
-        return u_most < std::numbers::pi / 2 ? p.polar.plus(polar_.turn(p.u_halvings)).sine : 1;
     }
 
     /// Puts a patch among those to look at unless it is hidden.
     void consider(Patch p) {
-        const double sine = ball_ ? p.polar.sine : p.u, out = ball_ ? R_ * sine : p.u,
-                     width = (ball_ ? outer(p) : std::min(outer(p), R_)) * sine,
-                     du = polar_.range(p.u_halvings), dv = azimuths_.range(p.v_halvings);
-        p.centre = {point_[0] + out * p.azimuth.cosine, point_[1] + out * p.azimuth.sine,
-                    point_[2] + (ball_ ? R_ * p.polar.cosine : 0)};
+        const double u_most = std::min(p.u + p.du, ball_ ? std::numbers::pi / 2 : R_),
+                     sine = ball_ ? std::sin(p.u) : p.u, width = (ball_ ? std::sin(u_most) : u_most) * sine,
+                     out = ball_ ? R_ * sine : p.u;
+        p.centre = {point_[0] + out * std::cos(p.v), point_[1] + out * std::sin(p.v),
+                    point_[2] + (ball_ ? R_ * std::cos(p.u) : 0)};
         // Of two places: 4 sin²(Δu/2) + 4 sin u₁ sin u₂ sin²(Δv/2).
-        p.spread = (ball_ ? R_ : 1) * std::sqrt(du * du + width * dv * dv);
+        p.spread = (ball_ ? R_ : 1) * std::sqrt(p.du * p.du + width * p.dv * p.dv);
         if (hidden(p)) return;
         heap_.push_back(p);
         std::push_heap(heap_.begin(), heap_.end(), worse);
@@ -306,16 +266,13 @@ private:
     /// Considers the halves of a patch, across its longer side.
     void halve(const Patch& p) {
         Patch a = p, b = p;
-        if (polar_.range(p.u_halvings) >= outer(p) * azimuths_.range(p.v_halvings)) {
-            const int k = a.u_halvings = b.u_halvings = p.u_halvings + 1;
-            a.u -= polar_.range(k);
-            b.u += polar_.range(k);
-            a.polar = p.polar.minus(polar_.turn(k));
-            b.polar = p.polar.plus(polar_.turn(k));
+        const double across = ball_ ? std::sin(std::min(p.u + p.du, std::numbers::pi / 2)) : p.u + p.du;
+        if (p.du >= across * p.dv) {
+            a.du = b.du = p.du / 2;
+            a.u -= a.du, b.u += b.du;
         } else {
-            const int k = a.v_halvings = b.v_halvings = p.v_halvings + 1;
-            a.azimuth = p.azimuth.minus(azimuths_.turn(k));
-            b.azimuth = p.azimuth.plus(azimuths_.turn(k));
+            a.dv = b.dv = p.dv / 2;
+            a.v -= a.dv, b.v += b.dv;
         }
         consider(a);
         consider(b);
@@ -348,9 +305,8 @@ private:
     std::size_t index_;
     Point3 point_;
     bool ball_;
-    double R_, floor_;  ///< mm; no place is lower than the floor
-    Near near_;         ///< obstacles that can be in the way
-    Halvings polar_{0}, azimuths_{std::numbers::pi / 3};
+    double R_, floor_;                ///< mm; no place is lower than the floor
+    Near near_;                       ///< obstacles that can be in the way
     Found blocked_ = Found::blocked;  ///< until a place is met that the cutter has for itself
     std::vector<Patch> heap_;         ///< the farthest from what is known to be in the way first
 };
