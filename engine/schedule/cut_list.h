@@ -46,7 +46,7 @@ struct Cost {
     std::optional<double> base_board;  ///< where it is sawn from boards of its own thickness
     std::optional<double> glue, machine;
     std::optional<double> dowels;  ///< where the build has some
-    double total = 0;  ///< of what has a price
+    double total = 0;              ///< of what has a price
 };
 
 /// Amounts that cost something.
