@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <memory>
 #include <numbers>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -155,15 +158,19 @@ public:
     }
 
     LayerResult run() {
+        if (!cut_.job.cutting.uniform_steps) take_stock();
         take(face_layer(cut_));
         reached(0.01);
         for (Operation& op : rough_layer(cut_)) take(std::move(op));
+        drop_idle();
         reached(0.21);
-        for (const bool floors : {!layer_.walls_first, layer_.walls_first})
+        for (const bool floors : {!layer_.walls_first, layer_.walls_first}) {
             take(floors ? finish_floors(cut_) : finish_walls(cut_));
+            drop_idle();
+        }
         reached(0.24);
-        if (cut_.job.cutting.uniform_steps) finish([](const Operation&) {});
-        else finish_by_what_stands();
+        if (stock_) finish_by_what_stands(*stock_);
+        else finish([](const Operation&) {});
         if (result_.given_up) return std::move(result_);
         report_no_way_in(cut_, result_);
         for (Operation& op : drill_holes(cut_)) take(std::move(op));
@@ -177,6 +184,14 @@ public:
         context_.throw_if_cancelled();
         reached(1);
         return std::move(result_);
+    }
+
+    LayerPaths(const LayerPaths&) = delete;
+    LayerPaths& operator=(const LayerPaths&) = delete;
+    ~LayerPaths() {
+        if (!stock_) return;
+        *memory_ = std::move(*stock_).release();  // left to the next layer, however this one ends
+        if (layer_.stock_memory != nullptr) layer_.stock_memory->give(std::move(memory_));
     }
 
 private:
@@ -236,19 +251,7 @@ private:
     // What stands decides the rest: waste where the roughing cutter does not fit before the ball finishes,
     // and after it the corners that the ball leaves, by the flat end mill, and what is left of the cusps'
     // limit anywhere.
-    void finish_by_what_stands() {
-        ScratchPool<StockMemory> own;
-        ScratchPool<StockMemory>& pool = layer_.stock_memory != nullptr ? *layer_.stock_memory : own;
-        auto memory = pool.take([] { return std::make_unique<StockMemory>(); });
-        LayerStock stock(context_, layer_, cut_.solid, stock_cell(layer_), std::move(*memory));
-        // Left to the next layer, however this one ends.
-        struct Leaving {
-            ScratchPool<StockMemory>& pool;
-            std::unique_ptr<StockMemory> memory;
-            LayerStock& stock;
-            ~Leaving() { *memory = std::move(stock).release(), pool.give(std::move(memory)); }
-        } const leaving{pool, std::move(memory), stock};
-        drop_idle(stock);
+    void finish_by_what_stands(LayerStock& stock) {
         clear_waste(stock);
         if (hopeless()) return;
         finish([&](Operation& op) {
@@ -258,16 +261,29 @@ private:
         cut_corners(stock);
     }
 
-    // A floor's cutter may have taken the whole wall beside it, and the face mill all that roughing would.
-    void drop_idle(LayerStock& stock) {
+    void take_stock() {
+        const auto make = [] { return std::make_unique<StockMemory>(); };
+        memory_ = layer_.stock_memory != nullptr ? layer_.stock_memory->take(make) : make();
+        stock_.emplace(context_, layer_, cut_.solid, stock_cell(layer_), std::move(*memory_));
+        cut_.stock = &*stock_;
+    }
+
+    // Takes the operations that came since the last call off the stock, and drops those that take nothing: a
+    // floor's cutter may have taken the whole wall beside it, and the face mill all that roughing would.
+    void drop_idle() {
+        if (!stock_) return;
+        std::vector<Operation>& operations = result_.operations;
         std::vector<Operation> useful;
-        for (Operation& op : result_.operations) {
+        for (std::size_t k = off_stock_; k < operations.size(); ++k) {
+            Operation& op = operations[k];
             const Tool& tool =
                 op.tool == tools_.rough.number ? tools_.rough : tool_of_kind(cut_.job, ToolKind::face);
-            const bool idle = op.kind != OperationKind::face && stock.cut(context_, op, tool).nothing();
+            const bool idle = op.kind != OperationKind::face && stock_->cut(context_, op, tool).nothing();
             if (!idle) useful.push_back(std::move(op));
         }
-        result_.operations = std::move(useful);
+        operations.resize(off_stock_);
+        std::move(useful.begin(), useful.end(), std::back_inserter(operations));
+        off_stock_ = operations.size();
     }
 
     [[nodiscard]] RestPass waste(const Tool& tool, const char* purpose) const {
@@ -350,6 +366,9 @@ private:
     const LayerJob& layer_;
     const LayerTools& tools_;
     LayerCut cut_;
+    std::unique_ptr<StockMemory> memory_;
+    std::optional<LayerStock> stock_;  // none where steps are uniform, whatever stands
+    std::size_t off_stock_ = 0;        // operations that have been taken off it
     Standing standing_;  // once the slab has been faced; every operation after that cuts its moves into it
     const bool contours_ = clears_on_contours(cut_.job);
     double levels_share_ = 0;

@@ -326,10 +326,51 @@ LayerStock::LayerStock(Context& context, const LayerJob& layer, const LayerSolid
     }
 }
 
+namespace {
+
+// The squares of a grid, `side` cells wide, that a rectangle meets: first and last column, first and last
+// row.
+std::array<int, 4> squares_of(const CellGrid& grid, int side, const std::array<double, 2>& low,
+                              const std::array<double, 2>& high) {
+    const auto square = [&](double at, double first, int cells) {
+        return static_cast<int>(std::clamp((at - first) / grid.cell, 0.0, cells - 1.0)) / side;
+    };
+    return {square(low[0], grid.x0, grid.nx), square(high[0], grid.x0, grid.nx),
+            square(low[1], grid.y0, grid.ny), square(high[1], grid.y0, grid.ny)};
+}
+
+}  // namespace
+
+void LayerStock::note_hidden(std::span<const Move> moves, double radius) {
+    const int across = (grid_.nx + kHiding - 1) / kHiding, down = (grid_.ny + kHiding - 1) / kHiding;
+    hides_.resize(static_cast<std::size_t>(across) * static_cast<std::size_t>(down), 0);
+    for (std::size_t k = 1; k < moves.size(); ++k) {
+        if (moves[k].feed == 0) continue;
+        const auto x = std::minmax(to_mm(moves[k - 1].x), to_mm(moves[k].x)),
+                   y = std::minmax(to_mm(moves[k - 1].y), to_mm(moves[k].y));
+        const auto [i0, i1, j0, j1] = squares_of(grid_, kHiding, {x.first - radius, y.first - radius},
+                                                 {x.second + radius, y.second + radius});
+        for (int j = j0; j <= j1; ++j)
+            std::fill_n(hides_.begin() + static_cast<std::ptrdiff_t>(j) * across + i0, i1 - i0 + 1, char{1});
+    }
+}
+
+bool LayerStock::may_hide_remains(const std::array<double, 2>& low, const std::array<double, 2>& high) const {
+    if (hides_.empty()) return false;
+    const int across = (grid_.nx + kHiding - 1) / kHiding;
+    const auto [i0, i1, j0, j1] = squares_of(grid_, kHiding, low, high);
+    for (int j = j0; j <= j1; ++j) {
+        const auto row = hides_.begin() + static_cast<std::ptrdiff_t>(j) * across;
+        if (std::find(row + i0, row + i1 + 1, char{1}) != row + i1 + 1) return true;
+    }
+    return false;
+}
+
 Taken LayerStock::cut(Context& context, const Operation& operation, const Tool& tool) {
     const std::vector<Move>& moves = operation.moves;
     if (moves.size() < 2) return {};
     const CutterEnd end = cutter_end(cutter_shape(tool));
+    if (operation.spare > 0 && operation.spare < grid_.cell) note_hidden(moves, end.radius);
     const double r = end.radius, top = z_top_, cell_mm2 = grid_.cell * grid_.cell;
     auto over_bottom = [&](const Move& m) {
         return std::array<double, 3>{to_mm(m.x), to_mm(m.y), to_mm(m.z) - z_bottom_};

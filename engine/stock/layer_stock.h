@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <memory>
@@ -105,6 +106,10 @@ public:
     /// Takes away what the operation's feed moves meet, all of them straight (arcs are fitted when a layer is
     /// planned). Rows in parallel.
     Taken cut(Context& context, const Operation& operation, const Tool& tool);
+    /// Whether an operation that keeps off the part by less than a cell (Operation::spare) has cut near a
+    /// rectangle, mm: what it left may stand between the cells' centres.
+    [[nodiscard]] bool may_hide_remains(const std::array<double, 2>& low,
+                                        const std::array<double, 2>& high) const;
     /// Takes away what one place of a cutter covers.
     void cut_at(const CutterEnd& end, double x, double y, double tip_z);
     /// Takes away what a cutter covers whose tip goes straight between two places, mm.
@@ -179,7 +184,10 @@ private:
     CellGrid grid_;
     double z_bottom_ = 0, z_top_ = 0;
     StockMemory memory_;
-    std::size_t words_ = 0;  // of a row
+    std::size_t words_ = 0;             // of a row
+    static constexpr int kHiding = 16;  // cells: what hides remains is noted by squares of this side
+    std::vector<char> hides_;           // by square; empty: none does
+    void note_hidden(std::span<const Move> moves, double radius);
     mutable std::vector<float>
         most_left_;  // by word: no more than that is left over, now or later; what each_left() has found
     Trial* trial_ = nullptr;  // the innermost

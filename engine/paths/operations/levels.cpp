@@ -11,9 +11,11 @@
 
 #include "engine/paths/operations/finish_slopes.h"
 #include "engine/paths/runs/feet.h"
+#include "engine/paths/runs/idle_runs.h"
 #include "engine/paths/runs/layer_cut.h"
 #include "engine/paths/runs/level_runs.h"
 #include "engine/paths/runs/tolerances.h"
+#include "engine/stock/layer_stock.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/geometry/vectors.h"
 #include "kernels/parallel/parallel.h"
@@ -32,6 +34,14 @@ bool leaves_foot(double r, double nz, double above_bottom, double cusp) {
 
 double vertical_nz(const LayerCut& cut) {
     return std::cos(cut.job.cutting.vertical_deg * std::numbers::pi / 180);
+}
+
+constexpr double kWorthLeaving = 80;  // mm, a second at a feed of 5000 mm/min
+
+// Whether the stock's cells are so fine that none of what roughing keeps off walls stands between them.
+bool sees_allowance(const LayerCut& cut) {
+    constexpr double kShare = 0.9;
+    return cut.stock != nullptr && cut.stock->grid().cell < kShare * cut.job.cutting.wall_allowance;
 }
 
 }  // namespace
@@ -84,6 +94,7 @@ Operation finish_walls(const LayerCut& cut) {
             append_level_runs(contours[i], c, to_units(tips[i]), wanted, simplify_tolerance_units(gouge),
                               runs[i]);
         }
+    if (sees_allowance(cut)) take_out_idle(cut, cutter, kWorthLeaving, runs);
     cut_levels(path, cut, tool, part, runs, true);
     path.finish();
     return op;
@@ -185,7 +196,6 @@ private:
 // Takes stretches that are spared out of what is wanted of a closed contour: all at the ends of what is
 // wanted, others where leaving the contour and coming back takes no longer.
 void spare_long(std::span<const Point2> contour, const std::vector<char>& spared, std::vector<char>& wanted) {
-    constexpr double kWorthLeaving = 80;  // mm, a second at a feed of 5000 mm/min
     const std::size_t n = contour.size();
     std::size_t start = n;
     for (std::size_t k = 0; k < n && start == n; ++k)
@@ -245,6 +255,7 @@ public:
         for (std::size_t i = 0; i < tips_.size(); ++i) spaced_[i].cuts = !runs[i].empty();
         for (FootLevel& foot : feet(grid)) runs.push_back(std::move(foot.runs));
         op_.bands = bands_of(cut_, spaced_, slopes_.levels_keep, tool_.stepdown_max);
+        if (sees_allowance(cut_)) take_out_idle(cut_, cutter_, kWorthLeaving, runs);
         PathBuilder path(op_, tool_, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed),
                          cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
         path.set_surroundings(cut_.around(tool_, &part));

@@ -14,6 +14,7 @@
 #include "engine/paths/operations/raster_runs.h"
 #include "engine/paths/runs/chains.h"
 #include "engine/paths/runs/feet.h"
+#include "engine/paths/runs/idle_runs.h"
 #include "engine/paths/runs/layer_cut.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/geometry/vectors.h"
@@ -76,6 +77,16 @@ RasterLines chosen_lines(const LayerCut& cut, const RasterFacets& facets, const 
     return seconds(y) < clearly * seconds(x) ? y : x;
 }
 
+RasterRuns without_idle(const LayerCut& cut, RasterRuns runs) {
+    constexpr double kWorthLeaving = 30;  // mm: the next line is near
+    std::vector<std::vector<LevelRun>> lines(1);
+    for (std::vector<PathPoint>& run : runs) lines[0].push_back({std::move(run), false});
+    take_out_idle(cut, ball_cutter(cut.layer.tools.finish.diameter / 2), kWorthLeaving, lines);
+    runs.clear();
+    for (LevelRun& run : lines[0]) runs.push_back(std::move(run.points));
+    return runs;
+}
+
 }  // namespace
 
 Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
@@ -98,7 +109,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
                      cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     path.set_surroundings(cut.around(tool, &ball));
-    follow_nearest(path, chained(raster_runs(cut, facets, raster, ball), raster_slide(cut, ball)));
+    follow_nearest(
+        path, chained(without_idle(cut, raster_runs(cut, facets, raster, ball)), raster_slide(cut, ball)));
     path.finish();
     return op;
 }

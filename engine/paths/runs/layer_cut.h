@@ -15,6 +15,8 @@ namespace slabwright {
 /// Facets this near in height belong to one floor, mm.
 inline constexpr double kSameFloor = 0.005;
 
+class LayerStock;
+
 struct LayerCut {
     Context& context;
     const LayerJob& layer;
@@ -50,7 +52,8 @@ struct LayerCut {
     [[nodiscard]] const DropIndex& drops(const CutterShape& cutter) const;
     /// What a tool's links must know; `part` as for Surroundings.
     [[nodiscard]] Surroundings around(const Tool& tool, const DropIndex* part) const;
-    Standing* standing = nullptr;  ///< what stands after the operations so far; null: not known
+    Standing* standing = nullptr;       ///< what stands after the operations so far; null: not known
+    const LayerStock* stock = nullptr;  ///< the same, finer, and what is to be made of it; null: not known
     mutable std::vector<std::pair<CutterShape, std::unique_ptr<DropIndex>>> made_drops{};
     mutable std::vector<std::array<double, 3>> no_way_in{};  ///< where runs were left out (Surroundings)
 };

@@ -1,0 +1,84 @@
+#include "engine/stock/idle_ways.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+
+#include "kernels/parallel/parallel.h"
+#include "kernels/stock/sweep.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr int kBand = 128;       // rows of cells that one task looks at
+constexpr float kTakes = 1e-3F;  // mm: what takes off less cuts nothing
+constexpr double kWider = 0.75;  // of a cell: past half of its diagonal
+
+// A cutter that covers all that one covers which stands up to `more` mm beside it.
+CutterShape wider(const CutterShape& cutter, double more) {
+    CutterShape wide = cutter;
+    wide.radius += more;
+    if (wide.corner > 0) wide.corner += more;
+    return wide;
+}
+
+struct Lowers {
+    float* height;
+    void operator()(std::size_t cell, double z) {
+        height[cell] = std::min(height[cell], static_cast<float>(std::max(0.0, z)));
+    }
+};
+
+// Whether more than a limit is left over any cell that is swept.
+struct Leaves {
+    const LayerStock& stock;
+    const float* height;
+    std::size_t first;  // of these heights in the stock
+    double limit;
+    bool any = false;
+    void operator()(std::size_t cell, double /*z*/) {
+        const std::size_t c = first + cell;
+        any = any || static_cast<double>((height[cell] - stock.surface(c)) * stock.nz(c)) > limit;
+    }
+};
+
+}  // namespace
+
+std::vector<char> which_cut(Context& context, const LayerStock& stock, const CutterShape& cutter,
+                            std::span<const StraightPiece> pieces, double limit) {
+    std::vector<char> cuts(pieces.size(), 0);
+    const CellGrid& grid = stock.grid();
+    const CutterEnd end = cutter_end(cutter), wide = cutter_end(wider(cutter, kWider * grid.cell));
+    std::vector<float> heights(stock.heights().begin(), stock.heights().end());
+    const auto hides = [&](const StraightPiece& piece) {
+        const auto [x0, x1] = std::minmax(piece.from[0], piece.to[0]);
+        const auto [y0, y1] = std::minmax(piece.from[1], piece.to[1]);
+        const double r = wide.radius;
+        return stock.may_hide_remains({x0 - r, y0 - r}, {x1 + r, y1 + r});
+    };
+    const int bands = (grid.ny + kBand - 1) / kBand;
+    parallel_each(context, static_cast<std::size_t>(bands), [&](std::size_t band) {
+        const int first = static_cast<int>(band) * kBand, rows = std::min(kBand, grid.ny - first);
+        const CellGrid part{grid.x0, grid.y(first), grid.cell, grid.nx, rows};
+        const double y0 = part.y0 - wide.radius, y1 = part.y(rows - 1) + wide.radius;
+        float* const height = heights.data() + grid.index(0, first);
+        const StandingHeights standing{height, 0};
+        for (std::size_t p = 0; p < pieces.size(); ++p) {
+            std::array<double, 3> from = pieces[p].from, to = pieces[p].to;
+            if (std::max(from[1], to[1]) < y0 || std::min(from[1], to[1]) > y1) continue;
+            from[2] -= stock.z_bottom();
+            to[2] -= stock.z_bottom();
+            Leaves leaves{stock, height, grid.index(0, first), limit};
+            sweep_above(part, wide, from, to, standing, leaves);
+            if (!leaves.any && !hides(pieces[p])) continue;
+            // Of a piece that several bands know, any may say so.
+            std::atomic_ref(cuts[p]).store(1, std::memory_order_relaxed);
+            Lowers lowers{height};
+            sweep_above(part, end, from, to, standing, lowers);
+        }
+    });
+    return cuts;
+}
+
+}  // namespace slabwright
