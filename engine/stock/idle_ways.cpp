@@ -14,6 +14,9 @@ namespace {
 constexpr int kBand = 128;       // rows of cells that one task looks at
 constexpr float kTakes = 1e-3F;  // mm: what takes off less cuts nothing
 constexpr double kWider = 0.75;  // of a cell: past half of its diagonal
+// Of a cell: beside slopes up to 60° the part stands no higher over so much wider a cutter. On those what is
+// left is seen, however thin: it lies over the centres of cells.
+constexpr double kSteep = 2 * kWider;
 
 // A cutter that covers all that one covers which stands up to `more` mm beside it.
 CutterShape wider(const CutterShape& cutter, double more) {
@@ -30,16 +33,18 @@ struct Lowers {
     }
 };
 
-// Whether more than a limit is left over any cell that is swept.
-struct Leaves {
+// What is over the cells that are swept.
+struct Over {
     const LayerStock& stock;
     const float* height;
     std::size_t first;  // of these heights in the stock
-    double limit;
-    bool any = false;
-    void operator()(std::size_t cell, double /*z*/) {
+    double limit, steep;
+    bool more = false;  // more than the limit is left
+    bool wall = false;  // the part stands higher than the cutter by more than beside a slope
+    void operator()(std::size_t cell, double z) {
         const std::size_t c = first + cell;
-        any = any || static_cast<double>((height[cell] - stock.surface(c)) * stock.nz(c)) > limit;
+        more = more || static_cast<double>((height[cell] - stock.surface(c)) * stock.nz(c)) > limit;
+        wall = wall || static_cast<double>(stock.surface(c)) - z > steep;
     }
 };
 
@@ -69,9 +74,9 @@ std::vector<char> which_cut(Context& context, const LayerStock& stock, const Cut
             if (std::max(from[1], to[1]) < y0 || std::min(from[1], to[1]) > y1) continue;
             from[2] -= stock.z_bottom();
             to[2] -= stock.z_bottom();
-            Leaves leaves{stock, height, grid.index(0, first), limit};
-            sweep_above(part, wide, from, to, standing, leaves);
-            if (!leaves.any && !hides(pieces[p])) continue;
+            Over over{stock, height, grid.index(0, first), limit, kSteep * grid.cell};
+            sweep_above(part, wide, from, to, standing, over);
+            if (!over.more && !(over.wall && hides(pieces[p]))) continue;
             // Of a piece that several bands know, any may say so.
             std::atomic_ref(cuts[p]).store(1, std::memory_order_relaxed);
             Lowers lowers{height};

@@ -346,8 +346,8 @@ void LayerStock::note_hidden(std::span<const Move> moves, double radius) {
     hides_.resize(static_cast<std::size_t>(across) * static_cast<std::size_t>(down), 0);
     for (std::size_t k = 1; k < moves.size(); ++k) {
         if (moves[k].feed == 0) continue;
-        const auto x = std::minmax(to_mm(moves[k - 1].x), to_mm(moves[k].x)),
-                   y = std::minmax(to_mm(moves[k - 1].y), to_mm(moves[k].y));
+        const auto x = std::minmax({to_mm(moves[k - 1].x), to_mm(moves[k].x)}),
+                   y = std::minmax({to_mm(moves[k - 1].y), to_mm(moves[k].y)});
         const auto [i0, i1, j0, j1] = squares_of(grid_, kHiding, {x.first - radius, y.first - radius},
                                                  {x.second + radius, y.second + radius});
         for (int j = j0; j <= j1; ++j)
