@@ -8,7 +8,7 @@
 
 #include "engine/sheets/head.h"
 #include "engine/sheets/jet_feed.h"
-#include "engine/sheets/nesting.h"
+#include "engine/nesting/nesting.h"
 #include "kernels/errors.h"
 #include "tests/support/seed.h"
 

@@ -11,7 +11,7 @@
 #include "engine/sheets/engraving.h"
 #include "engine/sheets/head.h"
 #include "engine/sheets/jet_feed.h"
-#include "engine/sheets/nesting.h"
+#include "engine/nesting/nesting.h"
 #include "engine/sheets/sheet_cuts.h"
 #include "engine/sheets/sheet_slicing.h"
 
