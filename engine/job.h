@@ -67,6 +67,8 @@ enum class RoughLimit : std::uint8_t { smaller, finish_radius, cusp };
 enum class WorkZero : std::uint8_t { model, corner, centre, pin };
 /// How large slabs are sawn: all of them as the pattern needs, or each as its own layer does.
 enum class Blanks : std::uint8_t { pattern, layer };
+/// How slabs are cut from boards: by a panel saw, every cut from edge to edge; or milled out one by one.
+enum class BoardLayout : std::uint8_t { guillotine, nested };
 /// The axis whose coordinate changes its sign; the mirror lies in the origin.
 enum class MirrorAxis : std::uint8_t { none, x, y, z };
 
@@ -121,7 +123,8 @@ struct Slabs {
     Blanks blanks = Blanks::pattern;
     /// Of the boards that slabs are sawn from; 0: as large as the largest slab.
     double board_length = 0, board_width = 0;
-    double kerf = 4;  ///< of the saw
+    double kerf = 4;  ///< of the saw, or of the cutter that mills slabs out
+    BoardLayout layout = BoardLayout::guillotine;
 };
 
 /// A post of the user's own, as far as the engine knows of it: it names program files by it and hands it on

@@ -129,7 +129,9 @@ TEST(Blanks, APlanOfSmallSlabsIsProvenFromItsText) {
     Context context;
     const std::string stl = folder / "stepped.stl", out = folder / "out", whole = folder / "whole";
     write_stl(stl, stepped(context, 17, 50));
-    const Plan small = plan(context, stl, by_layer());
+    Job small_slabs = by_layer();
+    small_slabs.slabs.layout = BoardLayout::nested;
+    const Plan small = plan(context, stl, small_slabs);
     // Fine enough that whole tiles of the stock lie beside the upper slabs.
     ASSERT_TRUE(write_verified(context, small, out, stl, 0.25).passed);
     const Plan large = plan(context, stl, Job{});
@@ -142,6 +144,9 @@ TEST(Blanks, APlanOfSmallSlabsIsProvenFromItsText) {
     EXPECT_EQ(document["wood"]["uniform"]["sawn_m2"],
               json::parse(slurp(whole + "/plan.json"))["wood"]["sawn_m2"]);
     EXPECT_TRUE(document["cost"].is_null());
+    EXPECT_EQ(document["job"]["slabs"]["layout"], "nested");
+    EXPECT_NE(slurp(out + "/cut_list.csv").find("\nnest,1,"), std::string::npos);
+    EXPECT_NE(slurp(whole + "/cut_list.csv").find("\nboard,1,"), std::string::npos);
     // No feed goes past its slab by more than the face mill reaches.
     for (const Layer& layer : small.layers) {
         const Blank blank = slab_of(small, layer);

@@ -1,5 +1,5 @@
-// Slabs on boards: a panel saw can part them, nothing is lost, and a price is reckoned only where one is
-// stated.
+// Slabs on boards: a panel saw can part them, or a cutter can mill them out; nothing is lost, and a price is
+// reckoned only where one is stated.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 #include <random>
 
 #include "engine/schedule/cut_list.h"
+#include "engine/schedule/nested_boards.h"
 #include "io/read/cut_list_check.h"
 #include "io/write/cut_list_files.h"
 #include "io/write/wood_json.h"
@@ -86,6 +87,51 @@ void check(const std::vector<SawnBoard>& boards, std::span<const SawnSize> piece
     EXPECT_EQ(seen, std::vector<int>(pieces.size(), 1)) << "every piece once";
 }
 
+/// All that a nested layout has to keep: pieces and offcuts lie on their board, a kerf from each other.
+void check_nested(const std::vector<SawnBoard>& boards, std::span<const SawnSize> pieces,
+                  const SawnSize& size, double kerf) {
+    std::vector<int> seen(pieces.size());
+    for (const SawnBoard& board : boards) {
+        EXPECT_TRUE(board.cuts.empty());
+        std::vector<SawnRectangle> all = board.offcuts;
+        for (const SawnPiece& piece : board.pieces) {
+            ++seen.at(piece.piece);
+            const SawnSize& asked = pieces[piece.piece];
+            EXPECT_DOUBLE_EQ(piece.place.length, piece.turned ? asked.width : asked.length);
+            EXPECT_DOUBLE_EQ(piece.place.width, piece.turned ? asked.length : asked.width);
+            all.push_back(piece.place);
+        }
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            EXPECT_GE(std::min(all[i].x, all[i].y), -kSame);
+            EXPECT_LE(all[i].x + all[i].length, size.length + kSame);
+            EXPECT_LE(all[i].y + all[i].width, size.width + kSame);
+            for (std::size_t k = 0; k < i; ++k) {
+                const SawnRectangle a{all[k].x - kerf, all[k].y - kerf, all[k].length + 2 * kerf,
+                                      all[k].width + 2 * kerf};
+                EXPECT_FALSE(overlap(all[i], a)) << "nearer than the kerf";
+            }
+        }
+        for (const SawnRectangle& offcut : board.offcuts)
+            EXPECT_GE(std::min(offcut.length, offcut.width), kLeastOffcut);
+    }
+    EXPECT_EQ(seen, std::vector<int>(pieces.size(), 1)) << "every piece once";
+}
+
+/// The largest single offcut of all boards, mm².
+double largest_offcut(const std::vector<SawnBoard>& boards) {
+    double largest = 0;
+    for (const SawnBoard& board : boards)
+        for (const SawnRectangle& r : board.offcuts) largest = std::max(largest, r.mm2());
+    return largest;
+}
+
+/// What the proof finds in a cut list.
+std::string codes_of(const std::string& text, const BuildPlan& build) {
+    std::string found;
+    for (const Violation& v : check_cut_list(text, build)) found += v.code + " ";
+    return found;
+}
+
 /// Whether one board holds pieces in their order from `next` on, however guillotine cuts part it.
 bool holds(std::vector<SawnRectangle> free, std::vector<SawnSize> pieces, double kerf) {
     if (pieces.empty()) return true;
@@ -130,6 +176,22 @@ Plan stack(Job job, std::vector<Blank> blanks) {
     }
     plan.totals.build_minutes = 90;
     return plan;
+}
+
+/// A plan as the proof reads it.
+BuildPlan read_back(const Plan& plan) {
+    BuildPlan build;
+    build.job = plan.job;
+    build.job_stated = true;
+    build.stock_min = plan.stock_min;
+    build.stock_max = plan.stock_max;
+    for (const Layer& layer : plan.layers) {
+        LayerToBuild& to = build.layers.emplace_back();
+        to.index = layer.index;
+        to.slab_thickness = layer.slab_thickness;
+        to.blank = layer.blank;
+    }
+    return build;
 }
 
 }  // namespace
@@ -229,23 +291,9 @@ TEST(CutList, TheProofFollowsItAtTheSaw) {
     job.slabs.length = 1500;
     job.slabs.width = 900;
     const Plan plan = stack(job, {{{0, 0}, {500, 400}}, {{100, 100}, {311, 252}}, {{10, 20}, {95, 71}}});
-    BuildPlan build;
-    build.job = job;
-    build.job_stated = true;
-    build.stock_min = plan.stock_min;
-    build.stock_max = plan.stock_max;
-    for (const Layer& layer : plan.layers) {
-        LayerToBuild& to = build.layers.emplace_back();
-        to.index = layer.index;
-        to.slab_thickness = layer.slab_thickness;
-        to.blank = layer.blank;
-    }
+    BuildPlan build = read_back(plan);
     const std::string csv = cut_list_csv(cut_list(plan));
-    const auto codes = [&](const std::string& text) {
-        std::string found;
-        for (const Violation& v : check_cut_list(text, build)) found += v.code + " ";
-        return found;
-    };
+    const auto codes = [&](const std::string& text) { return codes_of(text, build); };
     ASSERT_EQ(codes(csv), "");
     // Every number that is wrong by a millimetre or more is told, and every line that is missing.
     std::size_t begin = csv.find('\n') + 1, changed = 0;
@@ -270,6 +318,97 @@ TEST(CutList, TheProofFollowsItAtTheSaw) {
     EXPECT_EQ(codes(csv + "piece,1\n"), "cut_list.unreadable ");
     build.layers[1].blank->max[0] += 1;
     EXPECT_EQ(codes(csv), "cut_list.piece ") << "a slab that is sawn smaller than the plan lays it";
+}
+
+TEST(CutList, SlabsMilledOutLieAKerfApartAndNeverTakeMoreBoards) {
+    std::mt19937 random(test::seed());
+    std::size_t sawn_boards = 0, nested_boards = 0;
+    double sawn_offcuts = 0, nested_offcuts = 0;
+    for (int trial = 0; trial < 10; ++trial) {
+        const bool is_whole =
+            trial % 3 != 0;  // sizes in whole millimetres, as slabs.blanks = "layer" has them
+        const auto mm = [&](double low, double high) {
+            const double value = std::uniform_real_distribution(low, high)(random);
+            return is_whole ? std::round(value) : value;
+        };
+        const SawnSize board{mm(600, 2500), mm(600, 1300)};
+        const double kerf = trial % 4 == 0 ? 0 : mm(1, 8);
+        std::vector<SawnSize> pieces(std::uniform_int_distribution<std::size_t>(1, 16)(random));
+        for (SawnSize& s : pieces) s = {mm(20, 0.6 * board.length), mm(20, 0.6 * board.width)};
+        if (trial % 5 == 0) pieces[0] = board;
+        if (trial % 7 == 0) pieces.back() = {board.width, std::min(board.length, 100.0)};
+        const std::vector<SawnBoard> sawn = lay_on_boards(pieces, board, kerf),
+                                     boards = nest_on_boards(pieces, board, kerf);
+        ASSERT_EQ(sawn.empty(), boards.empty());
+        check_nested(boards, pieces, board, kerf);
+        EXPECT_LE(boards.size(), sawn.size());
+        if (boards.size() == sawn.size() && largest_offcut(sawn) >= kLeastOffcut * kLeastOffcut) {
+            sawn_offcuts += largest_offcut(sawn) * 1e-6;
+            nested_offcuts += largest_offcut(boards) * 1e-6;
+        }
+        sawn_boards += sawn.size();
+        nested_boards += boards.size();
+        EXPECT_EQ(boards, nest_on_boards(pieces, board, kerf));
+    }
+    std::printf("  %zu boards sawn, %zu milled out; where as many, offcuts %.2f and %.2f m2\n", sawn_boards,
+                nested_boards, sawn_offcuts, nested_offcuts);
+    EXPECT_GT(nested_offcuts, sawn_offcuts);
+    EXPECT_TRUE(nest_on_boards(std::vector<SawnSize>{{1001, 10}}, {1000, 1000}, 4).empty());
+}
+
+TEST(CutList, NestedSlabsFillABoardToTheKerf) {
+    const std::vector<SawnSize> quarters(4, {498, 298});
+    const std::vector<SawnBoard> one = nest_on_boards(quarters, {1000, 600}, 4);
+    ASSERT_EQ(one.size(), 1U);
+    check_nested(one, quarters, {1000, 600}, 4);
+    EXPECT_TRUE(one[0].offcuts.empty());
+    EXPECT_EQ(nest_on_boards(std::vector<SawnSize>(4, {499, 298}), {1000, 600}, 4).size(), 2U);
+    const std::vector<SawnBoard> alone = nest_on_boards(std::vector<SawnSize>{{300, 200}}, {1000, 600}, 5);
+    ASSERT_EQ(alone[0].offcuts.size(), 2U);
+    EXPECT_EQ(alone[0].offcuts[0].mm2(), 795 * 600) << "beside the piece, which stands upright";
+    EXPECT_EQ(alone[0].offcuts[1].mm2(), 200 * 295) << "above it, a kerf from the first";
+}
+
+TEST(CutList, TheProofHoldsANestToItsKerf) {
+    Job job;
+    job.slabs.length = 1500;
+    job.slabs.width = 900;
+    job.slabs.layout = BoardLayout::nested;
+    const Plan plan = stack(job, {{{0, 0}, {500, 400}}, {{100, 100}, {311, 252}}, {{10, 20}, {95, 71}}});
+    BuildPlan build = read_back(plan);
+    const CutList list = cut_list(plan);
+    const std::string csv = cut_list_csv(list);
+    ASSERT_EQ(codes_of(csv, build), "");
+    EXPECT_EQ(csv.find("\ncut,"), std::string::npos);
+    EXPECT_EQ(cut_list_dxf(list).find("\n8\nCUT\n"), std::string::npos) << "nothing lies on that layer";
+    // A piece moved towards another by less than a millimetre, or off its board.
+    CutList moved = list;
+    std::vector<SawnPiece>& pieces = moved.boards[0].sawn.pieces;
+    for (std::size_t i = 0; i < pieces.size(); ++i)
+        for (std::size_t k = 0; k < pieces.size(); ++k) {
+            const SawnRectangle was = pieces[i].place, &other = pieces[k].place;
+            if (i == k) continue;
+            for (const bool over : {false, true}) {
+                pieces[i].place.x = other.x + (over ? other.length + 3.5 : 1);
+                pieces[i].place.y = other.y;
+                if (over && pieces[i].place.x + was.length > 1500) continue;
+                EXPECT_NE(codes_of(cut_list_csv(moved), build), "") << i << " beside " << k;
+            }
+            pieces[i].place = {-0.5, was.y, was.length, was.width};
+            EXPECT_NE(codes_of(cut_list_csv(moved), build), "") << "off its board";
+            pieces[i].place = was;
+            ++pieces[i].place.length;
+            EXPECT_NE(codes_of(cut_list_csv(moved), build), "") << "another size than the plan's";
+            pieces[i].place = was;
+        }
+    EXPECT_EQ(codes_of(csv + csv.substr(csv.find("piece,")), build).find("cut_list.piece"), 0U) << "twice";
+    std::string with_cut = csv;
+    with_cut.insert(csv.find("piece,"), "cut,1,19,cut 1,,,4,900,700,0,\n");
+    EXPECT_EQ(codes_of(with_cut, build), "cut_list.cut ");
+    build.job.slabs.layout = BoardLayout::guillotine;
+    EXPECT_EQ(codes_of(csv, build), "cut_list.cut ") << "the job's boards are sawn";
+    build.job_stated = false;
+    EXPECT_EQ(codes_of(csv, build), "") << "without the job pieces need not be apart";
 }
 
 TEST(CutList, ASlabLargerThanABoardIsRefused) {

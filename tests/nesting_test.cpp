@@ -6,9 +6,9 @@
 #include <numbers>
 #include <random>
 
+#include "engine/nesting/nesting.h"
 #include "engine/sheets/head.h"
 #include "engine/sheets/jet_feed.h"
-#include "engine/sheets/nesting.h"
 #include "kernels/errors.h"
 #include "tests/support/seed.h"
 

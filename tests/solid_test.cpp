@@ -187,6 +187,54 @@ TEST(FacetRoles, TellTheFoldOfTwoFacetsFromWhicheverCorner) {
         }
 }
 
+// Of two rings of thousands of facets that pass through each other: what crosses the other ring is unsure,
+// what lies farther from it than a facet is long is not.
+TEST(FacetRoles, AreFoundAmongThousandsOfFacets) {
+    Context context;
+    std::mt19937 random(test::seed());
+    constexpr int n = 64;
+    constexpr double longest = 42, sag = 1.5;  // mm: of edges, and of chords to the round
+    std::array<int, 2> crossing{}, apart{};
+    for (int trial = 0; trial < 3; ++trial) {
+        std::uniform_real_distribution<double> along(-350, 350), up(-90, 90);
+        const std::array<Point, 2> middles{Point{0, 0, 0}, Point{along(random), along(random), up(random)}};
+        shapes::Facets facets = shapes::torus(n);
+        const std::size_t of_one = facets.size();
+        for (std::size_t f = 0; f < of_one; ++f) {
+            facets.push_back(facets[f]);
+            for (Vec3f& p : facets.back())
+                p = {p.x + static_cast<float>(middles[1][0]), p.y + static_cast<float>(middles[1][1]),
+                     p.z + static_cast<float>(middles[1][2])};
+        }
+        const Mesh mesh = solid_of(context, facets);
+        ASSERT_EQ(mesh.facets.size(), facets.size());
+        ASSERT_EQ(mesh.roles.size(), facets.size());
+        for (std::size_t f = 0; f < facets.size(); ++f) {
+            const std::size_t other = f < of_one ? 1 : 0;
+            const Point& middle = middles[other];
+            double least = 1e9, most = -1e9;
+            for (const Vec3f& p : facets[f]) {
+                const double round = std::hypot(p.x - middle[0], p.y - middle[1]) - 300;
+                const double outside = std::hypot(round, p.z - middle[2]) - 100;
+                least = std::min(least, outside);
+                most = std::max(most, outside);
+            }
+            if (least < -sag && most > sag) {
+                EXPECT_EQ(mesh.roles[f], FacetRole::unsure) << trial << ' ' << f;
+                ++crossing[other];
+            } else if (least > longest || most < -longest) {
+                EXPECT_EQ(mesh.roles[f], least > 0 ? FacetRole::surface : FacetRole::inner)
+                    << trial << ' ' << f;
+                ++apart[other];
+            }
+        }
+    }
+    for (const std::size_t other : {0, 1}) {
+        EXPECT_GT(crossing[other], 50);
+        EXPECT_GT(apart[other], 5000);
+    }
+}
+
 TEST(Windings, AreThoseOfAngles) {
     Context context;
     std::mt19937 random(test::seed());

@@ -13,7 +13,8 @@
 #include <vector>
 
 #include "bench/peers/libnest2d_strip.h"
-#include "engine/sheets/nesting.h"
+#include "bench/peers/strips.h"
+#include "engine/nesting/nesting.h"
 
 namespace {
 
@@ -40,28 +41,15 @@ Loops polygon(const std::vector<std::array<double, 2>>& points, double scale) {
     for (const auto& p : points)
         loops.points.push_back({slabwright::to_units(p[0] * scale), slabwright::to_units(p[1] * scale)});
     loops.close_loop();
+    if (slabwright::area(loops) < 0) std::reverse(loops.points.begin(), loops.points.end());
     return loops;
 }
 
-/// "Shirts" of the EURO group on cutting and packing (ESICUP), first in J. Oliveira, A. Gomes, J. Ferreira,
-/// TOPOS, OR Spektrum 22 (2000): 99 pieces of 8 kinds on a strip of 40, half turns. 20 mm a unit.
-Strip shirts() {
-    struct Kind {
-        int count;
-        std::vector<std::array<double, 2>> points;
-    };
-    const std::vector<Kind> kinds{
-        {8, {{0, 0}, {7, 1}, {7, 5}, {0, 7}, {-1, 5}, {-1, 4}, {-2, 3}, {-1, 2}}},
-        {8, {{0, 0}, {11, 0}, {12, 2}, {11, 3}, {11, 5}, {10, 6}, {6, 5}, {3, 6}, {0, 5}, {-1, 3}}},
-        {8, {{0, 0}, {3, 0}, {3, -1}, {5, 0}, {8, 0}, {11, -1}, {12, 4}, {11, 8}, {7, 7}, {0, 7}}},
-        {15, {{0, 0}, {4, 0}, {4, 2}, {3, 3}, {0, 3}}},
-        {15, {{0, 0}, {8, 0}, {7, 1}, {1, 1}}},
-        {15, {{0, 0}, {4, 0}, {4, 1}, {0, 1}}},
-        {15, {{0, 0}, {3, 0}, {3, 1}, {0, 1}}},
-        {15, {{0, 0}, {8, 0}, {8, 2}, {6, 2}, {4, 1}, {3, 1}, {2, 2}, {-1, 2}}}};
-    Strip strip{"shirts", 800, {0, 180}, {}};
-    for (const Kind& kind : kinds)
-        for (int i = 0; i < kind.count; ++i) strip.pieces.push_back(polygon(kind.points, 20));
+/// A published instance in millimetres.
+Strip published(const slabwright::bench::PublishedStrip& from) {
+    Strip strip{from.name, from.width * from.scale, {0, 180}, {}};
+    for (const slabwright::bench::StripKind& kind : from.kinds)
+        for (int i = 0; i < kind.count; ++i) strip.pieces.push_back(polygon(kind.points, from.scale));
     return strip;
 }
 
@@ -175,10 +163,10 @@ Packed best_of_theirs(const Strip& strip) {
 int main(int count, char** arguments) {
     const double given = count > 1 ? std::atof(arguments[1]) : 0;
     slabwright::Context context;
-    std::vector<Strip> strips{shirts()};
+    std::vector<Strip> strips{published(slabwright::bench::shirts()), published(slabwright::bench::swim()),
+                              published(slabwright::bench::trousers())};
     strips.push_back(random_parts("random, smooth, 40", 40, 0.15, 1));
     strips.push_back(random_parts("random, rough, 40", 40, 0.45, 2));
-    strips.push_back(random_parts("random, rough, 80", 80, 0.45, 3));
     std::printf(
         "| strip | pieces | libnest2d: utilisation | overlap, mm2 | s | slabwright: utilisation | overlap, "
         "mm2 | s | orders |\n|---|---|---|---|---|---|---|---|---|\n");

@@ -206,7 +206,7 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     if (propped) pattern = propped->view();
     place_keep_outs(plan, origin);
     check_probed_place(plan, origin);
-    (void)cut_list(plan);  // every slab is on a board
+    check_boards(plan);
     bond_layers(context, plan, joints, origin);
     const std::vector<std::vector<StandingFoot>> feet = standing_feet(context, plan, joints);
     const double cut = gaps == nullptr ? 1 : kTopShare;

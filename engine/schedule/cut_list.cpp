@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "engine/schedule/fit.h"
+#include "engine/schedule/nested_boards.h"
 
 namespace slabwright {
 
@@ -26,6 +27,22 @@ std::vector<BlankToSaw> blanks_of(const Plan& plan, Blanks as) {
                 {layer.index, k, layer.slab_thickness / layer.slabs, {blank.length(), blank.width()}});
     }
     return blanks;
+}
+
+/// @throws Error(no_plan, "slabs.board") for the largest that no board holds
+void require_on_board(const std::vector<BlankToSaw>& blanks, const Slabs& slabs) {
+    const SawnSize board = board_size(slabs);
+    const SawnSize* largest = nullptr;
+    for (const BlankToSaw& blank : blanks) {
+        const SawnSize& s = blank.size;
+        if (fits_on(board, s)) continue;
+        if (largest == nullptr || s.length * s.width > largest->length * largest->width) largest = &s;
+    }
+    if (largest == nullptr) return;
+    throw refusal("slabs.board",
+                  fmt::format("a slab of {:.1f} x {:.1f} mm is larger than a board of {:g} x {:g} mm",
+                              largest->length, largest->width, board.length, board.width),
+                  {}, "give larger boards (slabs.board_length, slabs.board_width) or less margin");
 }
 
 /// The price of a square metre of a board; 0: none is stated.
@@ -58,9 +75,13 @@ SawnSize board_size(const Slabs& slabs) {
             slabs.board_width > 0 ? slabs.board_width : slabs.width};
 }
 
+void check_boards(const Plan& plan) { require_on_board(blanks_of(plan, Blanks::layer), plan.job.slabs); }
+
 CutList cut_list(const Plan& plan, Blanks blanks) {
     CutList list;
     list.blanks = blanks_of(plan, blanks);
+    require_on_board(list.blanks, plan.job.slabs);
+    list.layout = plan.job.slabs.layout;
     const SawnSize board = board_size(plan.job.slabs);
     std::vector<double> thicknesses;
     for (const BlankToSaw& blank : list.blanks) thicknesses.push_back(blank.thickness);
@@ -77,16 +98,8 @@ CutList cut_list(const Plan& plan, Blanks blanks) {
             sizes.push_back(blank.size);
             which.push_back(i);
         }
-        std::vector<SawnBoard> laid = lay_on_boards(sizes, board, plan.job.slabs.kerf);
-        if (laid.empty()) {
-            const SawnSize& largest = *std::max_element(
-                sizes.begin(), sizes.end(),
-                [](const SawnSize& a, const SawnSize& b) { return a.length * a.width < b.length * b.width; });
-            throw refusal("slabs.board",
-                          fmt::format("a slab of {:.1f} x {:.1f} mm is larger than a board of {:g} x {:g} mm",
-                                      largest.length, largest.width, board.length, board.width),
-                          {}, "give larger boards (slabs.board_length, slabs.board_width) or less margin");
-        }
+        const auto lay = list.layout == BoardLayout::nested ? nest_on_boards : lay_on_boards;
+        std::vector<SawnBoard> laid = lay(sizes, board, plan.job.slabs.kerf);
         for (SawnBoard& sawn : laid) {
             for (SawnPiece& piece : sawn.pieces) piece.piece = which[piece.piece];
             list.boards.push_back({thickness, board, std::move(sawn)});

@@ -22,12 +22,13 @@ struct BlankToSaw {
 struct BoardToSaw {
     double thickness = 0;  ///< mm
     SawnSize size;
-    SawnBoard sawn;  ///< its pieces are indices into CutList::blanks
+    SawnBoard sawn;  ///< its pieces are indices into CutList::blanks; no cuts where it is nested
 };
 
 struct CutList {
     std::vector<BlankToSaw> blanks;  ///< the base board, then slabs from below
     std::vector<BoardToSaw> boards;  ///< thin ones first
+    BoardLayout layout = BoardLayout::guillotine;
     [[nodiscard]] double bought_m2() const;
     [[nodiscard]] double sawn_m2() const;  ///< of all blanks
 };
@@ -35,7 +36,12 @@ struct CutList {
 /// The boards that slabs are sawn from, mm: slabs.board_length and board_width, or the largest slab.
 [[nodiscard]] SawnSize board_size(const Slabs& slabs);
 
-/// What to saw for a build: the base board and every slab, those of one thickness together (lay_on_boards).
+/// Before anything is planned for them.
+/// @throws Error(no_plan, "slabs.board") where a slab, or the base board, is larger than a board
+void check_boards(const Plan& plan);
+
+/// What to saw for a build: the base board and every slab, those of one thickness together, as
+/// slabs.layout says (lay_on_boards, nest_on_boards).
 /// @param blanks pattern: as if every slab were as large as the plan's stock, to compare with
 /// @throws Error(no_plan, "slabs.board") where a slab is larger than a board
 [[nodiscard]] CutList cut_list(const Plan& plan, Blanks blanks = Blanks::layer);

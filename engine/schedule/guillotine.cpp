@@ -182,10 +182,14 @@ std::vector<SawnBoard> laid_by(std::span<const SawnSize> pieces, const SawnSize&
 
 }  // namespace
 
-std::vector<SawnBoard> lay_on_boards(std::span<const SawnSize> pieces, const SawnSize& board, double kerf) {
+bool fits_on(const SawnSize& board, const SawnSize& piece) {
     const SawnRectangle whole{0, 0, board.length, board.width};
+    return fits(whole, piece) || fits(whole, turned(piece));
+}
+
+std::vector<SawnBoard> lay_on_boards(std::span<const SawnSize> pieces, const SawnSize& board, double kerf) {
     for (const SawnSize& s : pieces)
-        if (!fits(whole, s) && !fits(whole, turned(s))) return {};
+        if (!fits_on(board, s)) return {};
     std::vector<SawnBoard> best;
     for (const Order order : {Order::area, Order::longer, Order::shorter, Order::around})
         for (const Fit fit : {Fit::area, Fit::shorter, Fit::longer})

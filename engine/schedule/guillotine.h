@@ -29,15 +29,19 @@ struct SawnPiece {
     friend bool operator==(const SawnPiece&, const SawnPiece&) = default;
 };
 
-/// A board with what is sawn from it. Pieces, offcuts and cuts cover it whole and nowhere twice.
+/// A board with what is sawn from it. Pieces, offcuts and cuts cover a sawn board whole and nowhere twice.
 struct SawnBoard {
     std::vector<SawnPiece> pieces;
-    /// What the saw takes, as wide as the kerf or what is left there, in an order in which they can be made:
-    /// each goes across the whole of a rectangle that the cuts before it have parted from the rest.
+    /// What the saw takes, as wide as the kerf or what is left there, in an order in which they can be made;
+    /// none where pieces are milled out (nest_on_boards). Each goes across the whole of a rectangle that the
+    /// cuts before it have parted from the rest.
     std::vector<SawnRectangle> cuts;
     std::vector<SawnRectangle> offcuts;  ///< what is left, the largest first
     friend bool operator==(const SawnBoard&, const SawnBoard&) = default;
 };
+
+/// Whether a board holds a piece, as it is or turned.
+[[nodiscard]] bool fits_on(const SawnSize& board, const SawnSize& piece);
 
 /// Lays pieces on as few boards as it finds, turned where that helps: one after another, each where it leaves
 /// the least beside it (guillotine best fit; J. Jylänki, A Thousand Ways to Pack the Bin, 2010), in several

@@ -5,13 +5,13 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/nesting/nesting.h"
 #include "engine/plan.h"
 #include "engine/sheets/alignment.h"
 #include "engine/sheets/corners.h"
 #include "engine/sheets/engraving.h"
 #include "engine/sheets/head.h"
 #include "engine/sheets/jet_feed.h"
-#include "engine/sheets/nesting.h"
 #include "engine/sheets/sheet_cuts.h"
 #include "engine/sheets/sheet_slicing.h"
 

@@ -88,21 +88,33 @@ private:
                                     width = number(cells[7]), x = number(cells[8]), y = number(cells[9]);
         if (!thickness || !length || !width || !x || !y) return lose("has a cell that is no number");
         const Part place{*x, *y, *length, *width};
-        if (cells[0] != "board" && !same(*thickness, thickness_))
+        const bool is_nest = cells[0] == "nest", is_board = is_nest || cells[0] == "board";
+        if (!is_board && !same(*thickness, thickness_))
             complain("cut_list.piece",
                      fmt::format("is of {:g} mm on a board of {:g} mm", *thickness, thickness_));
-        if (cells[0] == "board") {
+        if (is_board) {
             end_board();
-            parts_ = {place};
-            thickness_ = *thickness;
+            begin_board(place, *thickness, is_nest);
         } else if (cells[0] == "cut") cut(place);
         else if (cells[0] == "piece") piece(place, cells);
         else if (cells[0] == "offcut") take(place);
         else lose(fmt::format("says {}, which is none of its words", std::string(cells[0])));
     }
 
+    void begin_board(const Part& board, double thickness, bool is_nest) {
+        if (build_.job_stated && is_nest != (build_.job.slabs.layout == BoardLayout::nested))
+            complain("cut_list.cut", is_nest ? "slabs are milled out of this board; the job's are sawn"
+                                             : "this board is sawn; the job's slabs are milled out");
+        is_nest_ = is_nest;
+        board_ = board;
+        parts_.clear();
+        if (!is_nest) parts_ = {board};
+        thickness_ = thickness;
+    }
+
     /// All that the cuts leave of a board has been named.
     void end_board() {
+        if (is_nest_) return;  // what is milled out leaves a frame
         for (const Part& p : parts_)
             complain("cut_list.piece",
                      fmt::format("{:.1f} x {:.1f} mm at x {:.1f} y {:.1f} of the board before it is neither "
@@ -132,6 +144,7 @@ private:
     }
 
     void cut(const Part& saw) {
+        if (is_nest_) return complain("cut_list.cut", "is a saw's, in a board that slabs are milled out of");
         const auto part = part_around(saw);
         if (part == parts_.end()) return complain("cut_list.cut", "lies on no part that is still whole");
         const Part p = *part;
@@ -151,7 +164,27 @@ private:
         std::erase_if(parts_, [](const Part& r) { return r.length <= kNear || r.width <= kNear; });
     }
 
+    /// Milled out of a nested board, on it and a kerf from all before.
+    void mill(const Part& place) {
+        const double kerf = build_.job_stated ? build_.job.slabs.kerf : 0;
+        if (place.x < board_.x - kNear || place.y < board_.y - kNear ||
+            place.x + place.length > board_.x + board_.length + kNear ||
+            place.y + place.width > board_.y + board_.width + kNear)
+            complain("cut_list.piece", "does not lie on its board");
+        for (const Part& p : parts_) {
+            const double apart = std::max({place.x - p.x - p.length, p.x - place.x - place.length,
+                                           place.y - p.y - p.width, p.y - place.y - place.width});
+            if (apart >= kerf - kNear) continue;
+            complain("cut_list.piece", fmt::format("lies {:.1f} mm from what is at x {:.1f} y {:.1f}; the "
+                                                   "cutter takes {:g} mm",
+                                                   apart, p.x, p.y, kerf));
+            break;
+        }
+        parts_.push_back(place);
+    }
+
     void take(const Part& place) {
+        if (is_nest_) return mill(place);
         const auto part = part_around(place);
         if (part == parts_.end() || !same(part->length, place.length) || !same(part->width, place.width))
             complain("cut_list.piece", "is no part that the cuts leave");
@@ -184,8 +217,10 @@ private:
 
     const BuildPlan& build_;
     std::map<Which, Due> due_;
-    std::vector<Part> parts_;  // of the board at hand
-    double thickness_ = 0;     // of it
+    std::vector<Part> parts_;  // of the board at hand: what is left, or milled out where it is a nest
+    Part board_{};
+    double thickness_ = 0;  // of it
+    bool is_nest_ = false;
     std::uint32_t line_ = 0;
     bool lost_ = false;
     std::vector<Violation> found_;

@@ -10,9 +10,12 @@
 namespace slabwright {
 
 /// Follows the text line by line, as whoever stands at the saw: a board is taken, each cut goes from edge to
-/// edge of a part and parts it, each piece is one of the parts that are left. Violations, each with its line:
-/// cut_list.unreadable (a line that is none, after which nothing more is read), cut_list.cut, cut_list.piece
-/// (no such part, another size or thickness than the plan's slab, a slab twice or never).
+/// edge of a part and parts it, each piece is one of the parts that are left. From a nested board pieces and
+/// offcuts are milled, each on the board and at least slabs.kerf (where the job is stated, else nothing) from
+/// those before it, along x or along y. Violations, each with its line: cut_list.unreadable (a line that is
+/// none, after which nothing more is read), cut_list.cut (a cut that a saw cannot make, or any in a nested
+/// board; a board cut otherwise than slabs.layout says), cut_list.piece (no such part, one too near to
+/// another, another size or thickness than the plan's slab, a slab twice or never).
 /// @param build its stock, layers and, where the job is stated, its base board
 [[nodiscard]] std::vector<Violation> check_cut_list(std::string_view text, const BuildPlan& build);
 

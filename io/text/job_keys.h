@@ -68,6 +68,8 @@ constexpr bool shows(const Visit&, bool used) {
     else return true;
 }
 inline constexpr Word<Blanks> kBlankWords[] = {{"pattern", Blanks::pattern}, {"layer", Blanks::layer}};
+inline constexpr Word<BoardLayout> kBoardLayoutWords[] = {{"guillotine", BoardLayout::guillotine},
+                                                          {"nested", BoardLayout::nested}};
 template <std::size_t... i>
 consteval auto words_of_controls(std::index_sequence<i...> /*each*/) {
     struct Table {
@@ -334,7 +336,11 @@ void visit_slab_keys(SlabsLike& slabs, Visit& visit) {
                "with the same margin");
     visit.key("board_length", slabs.board_length, "mm, of the boards that slabs are sawn from; 0: as length");
     visit.key("board_width", slabs.board_width, "mm; 0: as width");
-    visit.key("kerf", slabs.kerf, "mm, of the saw");
+    visit.key("kerf", slabs.kerf, "mm, of the saw, or of the cutter that mills slabs out");
+    visit.word(
+        "layout", slabs.layout, kBoardLayoutWords,
+        "guillotine: every cut goes from edge to edge, as a panel saw does; nested: slabs are milled out "
+        "of their board one by one");
 }
 
 /// Walks the keys of glue and press.

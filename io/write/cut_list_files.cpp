@@ -58,6 +58,7 @@ void draw_holes(DxfText& text, const BlankToSaw& blank, const SawnPiece& piece, 
 
 std::string cut_list_csv(const CutList& list) {
     std::string text = "kind,board,thickness_mm,name,layer,slab,length_mm,width_mm,x_mm,y_mm,turned\n";
+    const char* kind_of_board = list.layout == BoardLayout::nested ? "nest" : "board";
     std::size_t number = 0;
     for (const BoardToSaw& board : list.boards) {
         ++number;
@@ -66,7 +67,8 @@ std::string cut_list_csv(const CutList& list) {
             text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", kind, number, mm(board.thickness), name,
                                 of, mm(r.length), mm(r.width), mm(r.x), mm(r.y), turned);
         };
-        line("board", fmt::format("board {}", number), ",", {0, 0, board.size.length, board.size.width}, "");
+        line(kind_of_board, fmt::format("board {}", number), ",", {0, 0, board.size.length, board.size.width},
+             "");
         std::size_t cut = 0, offcut = 0;
         for (const SawnRectangle& r : board.sawn.cuts) line("cut", fmt::format("cut {}", ++cut), ",", r, "");
         for (const SawnPiece& piece : board.sawn.pieces) {

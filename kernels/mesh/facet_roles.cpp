@@ -217,30 +217,49 @@ public:
     Meetings(MeshView mesh, const BoxTree& tree, std::span<std::uint8_t> met)
         : mesh_(mesh), tree_(tree), met_(met) {}
 
-    /// Holds the facets of one eight against each other and against all eights that follow it.
-    void look_from(std::size_t eight) {
-        const Box box = whole(tree_.levels[0][eight]);
+    /// Of a tree of one eight: holds its facets against each other.
+    void look_within() { pairs(0, 0, whole(tree_.levels[0][0])); }
+
+    /// Holds the facets of eight eights against each other and against all that follow: the way down the tree
+    /// is gone once for all of them, to the nodes of eights that they come near to.
+    void look_from(std::size_t block) {
+        const Boxes& own = tree_.levels[1][block];
+        const Box box = whole(own);
+        near_.clear();
         waiting_.assign(1, {tree_.levels.size() - 1, 0});
         while (!waiting_.empty()) {
             const auto [level, node] = waiting_.back();
             waiting_.pop_back();
-            if (level == 0) {
-                pairs(eight, node);
+            if (level == 1) {
+                near_.push_back(node);
                 continue;
             }
-            // Children of a node follow one another, so those wholly before this eight are none of its own.
-            const std::size_t span = std::size_t{1} << 3 * (level - 1);
+            // Children of a node follow one another, so those wholly before this block are none of its own.
+            const std::size_t span = std::size_t{1} << 3 * (level - 2);
             for (unsigned bits = meeting(tree_.levels[level][node], box); bits != 0; bits &= bits - 1) {
                 const std::size_t next = kTogether * node + static_cast<std::size_t>(std::countr_zero(bits));
-                if ((next + 1) * span > eight) waiting_.push_back({level - 1, next});
+                if ((next + 1) * span > block) waiting_.push_back({level - 1, next});
             }
+        }
+        const std::size_t first = kTogether * block,
+                          end = std::min(first + kTogether, tree_.levels[0].size());
+        for (std::size_t eight = first; eight < end; ++eight) {
+            const Box of_eight = child(own, eight - first);
+            for (const std::size_t node : near_)
+                for (unsigned bits = meeting(tree_.levels[1][node], of_eight); bits != 0; bits &= bits - 1) {
+                    const std::size_t other =
+                        kTogether * node + static_cast<std::size_t>(std::countr_zero(bits));
+                    if (other >= eight) pairs(eight, other, child(tree_.levels[1][node], other % kTogether));
+                }
         }
     }
 
 private:
-    void pairs(std::size_t eight, std::size_t other) {
+    /// @param of_other the box of all of the other's
+    void pairs(std::size_t eight, std::size_t other, const Box& of_other) {
         const Boxes &own = tree_.levels[0][eight], &boxes = tree_.levels[0][other];
-        for (std::size_t i = 0; i < kTogether && kTogether * eight + i < tree_.facets.size(); ++i) {
+        for (unsigned near = meeting(own, of_other); near != 0; near &= near - 1) {
+            const std::size_t i = static_cast<std::size_t>(std::countr_zero(near));
             unsigned bits = meeting(boxes, child(own, i));
             if (other == eight) bits &= ~0U << (i + 1);
             for (; bits != 0; bits &= bits - 1) {
@@ -265,6 +284,7 @@ private:
         std::size_t level, node;
     };
     std::vector<Waiting> waiting_;
+    std::vector<std::size_t> near_;  // nodes of eights
 };
 
 std::vector<std::uint8_t> find_met(Context& context, MeshView mesh) {
@@ -272,9 +292,13 @@ std::vector<std::uint8_t> find_met(Context& context, MeshView mesh) {
     const BoxTree tree = box_tree(context, mesh);
     std::vector<std::uint8_t> met(mesh.size(), 0);
     if (tree.levels.empty()) return met;
-    parallel_for(context, tree.levels[0].size(), kGrain / 64, [&](std::size_t begin, std::size_t end) {
+    if (tree.levels.size() == 1) {
+        Meetings(mesh, tree, met).look_within();
+        return met;
+    }
+    parallel_for(context, tree.levels[1].size(), kGrain / 512, [&](std::size_t begin, std::size_t end) {
         Meetings meetings(mesh, tree, met);
-        for (std::size_t e = begin; e < end; ++e) meetings.look_from(e);
+        for (std::size_t block = begin; block < end; ++block) meetings.look_from(block);
     });
     return met;
 }

@@ -21,8 +21,8 @@ mkdirSync(work, {recursive: true});
 
 const patterns = [];
 execFileSync(makeModels, ['metre', `${work}/metre.stl`, '--facets', '60000', '--height', '30'], {stdio: 'pipe'});
-// One thick slab, and passes as wide as they may be: the test is of the page.
-writeFileSync(`${work}/metre.toml`, '[slabs]\nthicknesses = [38.0]\n[tolerances]\ncusp = 0.4\n');
+// One thick slab, milled out of its board, and passes as wide as they may be: the test is of the page.
+writeFileSync(`${work}/metre.toml`, '[slabs]\nthicknesses = [38.0]\nlayout = "nested"\n[tolerances]\ncusp = 0.4\n');
 patterns.push([`${work}/metre.stl`, ['--job', `${work}/metre.toml`, '--allow-undercut', '--no-verify']]);
 if (process.env.SLABWRIGHT_CORPUS) {
     for (const name of ['castings/mold_cavity_ktool.stl', 'castings/midget_crankcase_front_pattern.stl', 'castings/bearing_block.stl']) {
@@ -53,6 +53,11 @@ for (const [stl, options] of patterns) {
     check.equal(`${name}: rows`, await page.locator('#operations tbody tr').count(), plan.totals.operations);
     check.equal(`${name}: every program's way is there`, data.paths.programs.filter(p => p.left_out).length, 0);
     check.that(`${name}: model within a stated error`, data.model.facets <= 80000 && data.model.error_mm < 0.002 * Math.max(...data.model.max.map((v, k) => v - data.model.min[k])), JSON.stringify(data.model.error_mm));
+    // The cut list says how slabs come out of their boards, and draws each.
+    const cutlist = page.locator('.sheet.cutlist'), how = await cutlist.locator('.key').textContent(), [board] = plan.wood.boards;
+    check.that(`${name}: how slabs are cut`, how.startsWith(plan.job.slabs.layout === 'nested' ? 'Slabs are milled out' : 'Every cut'), how);
+    check.that(`${name}: only a saw's cuts are drawn`, (board.cuts.length === 0) === (plan.job.slabs.layout === 'nested' || board.offcuts.length + board.pieces.length === 1), String(board.cuts.length));
+    check.equal(`${name}: board 1 has its rectangles`, await cutlist.locator('svg').first().locator('rect').count(), 1 + board.pieces.length + board.cuts.length + board.offcuts.length);
     const pages = pdfPages(await page.pdf({preferCSSPageSize: true}));
     // A layer with many programs or warnings may take a second page.
     check.that(`${name}: a cover and a page for each layer`, pages > plan.layers.length && pages <= 2 * plan.layers.length + 2 + Math.ceil(plan.wood.boards.length / 4), `${pages} for ${plan.layers.length}`);

@@ -1,4 +1,4 @@
-// What to saw: each board with its slabs, the saw's cuts in their order, and what is left.
+// What to saw or mill out: each board with its slabs, the saw's cuts in their order, and what is left.
 
 import {figure, make, plural} from './dom.js';
 import {plan} from './report.js';
@@ -72,6 +72,7 @@ export function cutListSheet() {
         make('div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'Pieces to saw'}, make('table', {id: 'cut-list-pieces'}, make('thead', {}, make('tr', {}, ['Pieces', 'Size mm', 'Thick mm', 'For layer', 'On board'].map((h, i) => make('th', {scope: 'col', class: i === 0 || i === 2 ? 'n' : null}, h)))),
             make('tbody', {}, pieces().map(line => make('tr', {}, make('td', {class: 'n', 'data-label': 'Pieces'}, String(line.names.length)), make('td', {}, make('strong', {}, sizeOf(line))), make('td', {class: 'n', 'data-label': 'Thick mm'}, figure(line.thickness, 2)),
                 make('td', {}, line.names.join(', ')), make('td', {}, [...line.boards].join(', '))))))),
-        make('p', {class: 'key'}, `Every cut (red, ${figure(kerf, 1)} mm) goes from edge to edge of what it cuts. Sizes are finished sizes. cut_list.csv holds the cuts in their order.`),
+        make('p', {class: 'key'}, plan.job.slabs.layout === 'nested' ? `Slabs are milled out of their board one by one, with a cutter of ${figure(kerf, 1)} mm or less. Sizes are finished sizes. cut_list.dxf draws their outlines.`
+            : `Every cut (red, ${figure(kerf, 1)} mm) goes from edge to edge of what it cuts. Sizes are finished sizes. cut_list.csv holds the cuts in their order.`),
         make('div', {class: 'boards'}, wood.boards.map((board, b) => make('figure', {}, boardView(board, b + 1), make('figcaption', {}, `Board ${b + 1}: ${sizeOf(board)} × ${figure(board.thickness, 2)} mm`)))));
 }

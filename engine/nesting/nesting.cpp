@@ -1,4 +1,4 @@
-#include "engine/sheets/nesting.h"
+#include "engine/nesting/nesting.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include <set>
 #include <tuple>
 
-#include "engine/sheets/nest_grid.h"
+#include "engine/nesting/nest_grid.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/pieces.h"

@@ -1,4 +1,4 @@
-#include "engine/sheets/nest_grid.h"
+#include "engine/nesting/nest_grid.h"
 
 #include <algorithm>
 #include <bit>
