@@ -340,7 +340,7 @@ TEST_F(TwoSided, AQuoteSaysWhatThePlanSays) {
     EXPECT_NE(quote_json(quoted).find("\"undersides\": 1"), std::string::npos) << quote_json(quoted);
 }
 
-TEST_F(TwoSided, CommandsThatDoNotKnowItSaySo) {
+TEST_F(TwoSided, CommandsSayWhatTheyCannotDo) {
     const auto told = [&](std::vector<std::string> arguments) {
         arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
         return support::run_command(arguments);
@@ -351,6 +351,9 @@ TEST_F(TwoSided, CommandsThatDoNotKnowItSaySo) {
     EXPECT_EQ(other.exit, 2) << other.err;
     EXPECT_NE(other.err.find("or take dowels.diameter = 18, whose holes T2 makes"), std::string::npos)
         << other.err;
+    const support::CommandResult quoted = told({"quote", built_->stl, "--sides", "two"});
+    EXPECT_EQ(quoted.exit, 2) << quoted.out;
+    EXPECT_NE(quoted.err.find("dowels.diameter = 18"), std::string::npos) << quoted.err;
     const support::CommandResult alone = told({"verify", built_->undersides.at(0)});
     EXPECT_NE(alone.exit, 0);
     EXPECT_NE(alone.err.find("underside"), std::string::npos) << alone.err;
