@@ -258,10 +258,11 @@ TEST_F(TwoSided, ABuildKilledAfterAnyStepGoesOnFromDisk) {
         const json steps = steps_of(folder);
         for (std::size_t after = 0; after <= steps.size(); ++after) {
             (void)resume_build(context, folder, finished(static_cast<int>(after)));
-            if (after == 1)  // when the slab is milled from below and not turned yet
+            if (after == 1) {  // when the slab is milled from below and not turned yet
                 EXPECT_EQ(support::schema_complaint(slurp(folder + "/progress.json"),
                                                     SLABWRIGHT_SOURCE_DIR "/io/progress.schema.json"),
                           "");
+            }
             // What is on disk is what the steps bring about.
             const ResumeStatus status = resume_build(context, folder, {});
             EXPECT_EQ(status.after, static_cast<int>(after));
