@@ -48,6 +48,8 @@ std::string quote_json(const QuotedModel& model) {
     json.end().key("cutting_minutes").rounded(q.cutting_minutes, 1);
     json.key("bonding_minutes").rounded(q.bonding_minutes, 1);
     json.key("tool_change_minutes").rounded(q.tool_change_minutes, 1);
+    if (model.job.layers.sides != SlabSides::one)
+        json.key("undersides").integer(q.undersides).key("underside_minutes").rounded(q.underside_minutes, 1);
     json.key("build_minutes").rounded(q.build_minutes, 1).key("spread").rounded(q.spread, 2);
     json.key("boards").integer(static_cast<std::int64_t>(q.boards.boards.size()));
     json.key("bought_m2").rounded(q.boards.bought_m2(), 4);
@@ -67,6 +69,9 @@ std::string quote_text(const QuotedModel& model) {
                     model.input.file, q.outcome.layers, q.outcome.layers == 1 ? "layer" : "layers",
                     hours(q.build_minutes), hours(q.cutting_minutes), hours(q.bonding_minutes),
                     hours(q.tool_change_minutes));
+    if (q.undersides > 0)
+        text += fmt::format("below   {} of the slabs {} milled from below first, {} of that time\n",
+                            q.undersides, q.undersides == 1 ? "is" : "are", hours(q.underside_minutes));
     const bool by_layer = model.job.slabs.blanks == Blanks::layer;
     for (const QuotedSlabs& s : q.slabs)
         text += fmt::format("slabs   {} of {:g} x {:.0f} x {:.0f} mm{}\n", s.count, s.thickness, q.stock[0],
@@ -75,8 +80,10 @@ std::string quote_text(const QuotedModel& model) {
                         q.mass_kg, boards_text(q.boards));
     text += fmt::format("glue    on {:.3f} m2\n", q.glue_m2) + cost_text(model.job, q.cost);
     if (q.outcome.unmade_mm3 >= 1)
-        text += fmt::format("unmade  {:.1f} cm3 under overhangs, up to {:.1f} mm high\n",
-                            q.outcome.unmade_mm3 / 1000, q.outcome.unmade_mm);
+        text += fmt::format("unmade  {:.1f} cm3 under overhangs{}, up to {:.1f} mm high\n",
+                            q.outcome.unmade_mm3 / 1000,
+                            q.undersides > 0 ? " that are reached neither from above nor from below" : "",
+                            q.outcome.unmade_mm);
     return text;
 }
 

@@ -246,7 +246,7 @@ void replay_programs(Context& context, const PlannedFolder& folder, const Simula
                                                 replay.first(), options.cell, replay.nx(), replay.ny());
     Json layers = Json::array();
     for (const PackedFilling::Layer& l : filled.layers)
-        layers.push_back({{"boxes", l.boxes}, {"mm3", l.mm3}});
+        layers.push_back({{"boxes", l.boxes}, {"mm3", l.mm3}, {"below", l.below}});
     figures.data["filled"] = {{"z0", filled.z0},
                               {"height", filled.height},
                               {"tolerance_mm", filled.tolerance},

@@ -95,11 +95,11 @@ public:
           place_((out_ / kProgress).string()) {}
 
     ResumeStatus run() {
-        if (folder_.turned || !folder_.build.undersides.empty())
-            throw Error(ErrorKind::usage, "resume.sides",
-                        "a build with slabs milled on both sides cannot be resumed yet",
+        if (folder_.turned && options_.remake)
+            throw Error(ErrorKind::usage, "resume.turned",
+                        "is a slab's underside: there is no layer under it to go back to",
                         (out_ / "plan.json").string(),
-                        "go on by hand after the last step of sequence.json that was finished");
+                        "take another slab, and begin its sequence anew with --after 0");
         read_progress();
         if (options_.after) progress_.after = *options_.after;
         if (progress_.after < 0 ||

@@ -249,6 +249,10 @@ VerifyResult verdict(const Verification& found) {
                  m.tool.name, m.tool.flute_length, m.tool.stickout, m.gain_mm2, result.unreachable_mm2,
                  m.depth_mm, std::max(1.0, m.minutes)),
              m.where});
+    for (const UndersideFindings& under : found.undersides)
+        if (under.floor && found.strength_mpa > 0 && under.floor->stress_mpa() > found.strength_mpa)
+            result.advice.push_back(
+                weak_floor(under.layer, *under.floor, {0, under.floor_pressure_mpa}, found.strength_mpa));
     for (const Violation& v : found.report.violations) {
         Diagnostic d{Severity::error, v.code, v.message, v.where};
         if (!v.file.empty())

@@ -33,6 +33,7 @@ struct Verification {
     SimulationInput input;             ///< its mesh is not set: pattern has it
     SimulationReport report;
     std::vector<UndersideFindings> undersides;  ///< their violations stand in `report` too
+    double strength_mpa = 0;                    ///< of the wood; 0: plan.json does not say
     std::vector<MissingTool> missing;           ///< tools that would reach what is out of reach
     std::string json;                           ///< what verify.json holds (schema slabwright.verify/1)
 };

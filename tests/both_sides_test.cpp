@@ -53,6 +53,23 @@ TEST(BothSides, ABoundaryForEachTunnel) {
     EXPECT_EQ(level.size(), 2U);
 }
 
+// Of three tunnels one lies under the range in which a boundary makes the two others: it lies as high as to
+// leave 3 mm over the third.
+TEST(BothSides, AFloorOverARecessIsAsThickAsItCanBe) {
+    AirGaps lines;
+    lines.top = 60;
+    lines.grid = {0, 0, 1, 1, 300};
+    lines.rows.resize(1);
+    for (const auto& [low, high] : {std::pair{10.0, 20.0}, {18.0, 30.0}, {5.0, 17.0}})
+        for (int k = 0; k < 100; ++k)
+            lines.rows[0].push_back({static_cast<std::uint32_t>(lines.rows[0].size()), 0, low, high, true});
+    const std::vector<double> tops = tops_of(place_layers_both_sides(request(60, 60, 3), lines));
+    ASSERT_EQ(tops.size(), 3U);
+    EXPECT_LE(tops[0], 17 + 1e-3);
+    EXPECT_GE(tops[1], 20 - 1e-3);
+    EXPECT_LE(tops[1], 30 + 1e-3);
+}
+
 TEST(BothSides, LayersKeepToTheirThickness) {
     Context context;
     const Mesh block = weld(context, block_with_tunnels({0, 0, 0}, {60, 20, 60}, {{15, 8, 6}, {45, 9, 6}}));

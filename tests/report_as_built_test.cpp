@@ -86,6 +86,8 @@ TEST(ReportAsBuilt, FillingIsABoxARow) {
         packed_filling(context, mesh.view(), layers, {false, true}, {-1.5, 0.5}, 1, 34, 10);
     EXPECT_EQ(turned.layers[1].mm3, 0) << "which is milled from below";
     EXPECT_TRUE(turned.layers[1].boxes.empty());
+    EXPECT_EQ(turned.layers[1].below, filling.layers[1].boxes) << "which is drawn as milled";
+    EXPECT_TRUE(filling.layers[1].below.empty());
 }
 
 // A hollow inside a layer opens to neither side.

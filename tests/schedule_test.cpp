@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <random>
 #include <set>
+
+#include "tests/support/seed.h"
 
 using namespace slabwright;
 
@@ -65,6 +68,49 @@ TEST(Schedule, ProgramNamesSortInTheOrderOfExecution) {
     Plan small = plan_of_layers(3);
     name_programs(small);
     EXPECT_EQ(small.layers[2].operations[1].file, "L003_02_rough_T2.ngc");
+}
+
+// One control may hold the programs of the build and those of its undersides.
+TEST(Schedule, NoTwoProgramsOfABuildHaveOneNumber) {
+    const unsigned seed = test::seed();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const auto below = [&](unsigned n) { return static_cast<std::size_t>(random() % n); };
+    for (int round = 0; round < 60; ++round) {
+        Plan plan = plan_of_layers(1 + static_cast<int>(below(round % 3 == 0 ? 90 : 20)));
+        plan.job.machine.programs = static_cast<ProgramSpan>(below(3));
+        const unsigned most = round % 2 == 0 ? 60 : 20;
+        const auto fill = [&](Layer& layer) {
+            layer.operations.clear();
+            for (std::size_t k = 0; k < 1 + below(most); ++k)
+                layer.operations.push_back(
+                    operation(OperationKind::finish, 1 + static_cast<int>(below(3)), 1));
+        };
+        for (Layer& layer : plan.layers) {
+            fill(layer);
+            if (below(2) == 0) continue;
+            Plan under;
+            under.job = plan.job;
+            under.turned.emplace().layer = layer.index;
+            under.layers = {layer};
+            fill(under.layers[0]);
+            schedule(under);
+            plan.undersides.push_back(std::move(under));
+        }
+        schedule(plan);
+        std::map<int, std::string> numbers;
+        const auto check = [&](const Plan& of, const std::string& folder) {
+            for (const Layer& layer : of.layers)
+                for (const Operation& op : layer.operations) {
+                    const std::string file = folder + std::string(file_of(op.file));
+                    EXPECT_GT(op.number, 0);
+                    EXPECT_LE(op.number, 8000) << "from there on layers are faced off again";
+                    EXPECT_EQ(numbers.emplace(op.number, file).first->second, file) << "O" << op.number;
+                }
+        };
+        check(plan, "");
+        for (const Plan& under : plan.undersides) check(under, underside_folder(under.turned->layer));
+    }
 }
 
 TEST(Schedule, StepsNeedOnlyEarlierStepsAndAllLeadToTheUnloading) {

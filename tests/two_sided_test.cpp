@@ -8,14 +8,17 @@
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <set>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "engine/undersides/floors.h"
 #include "engine/undersides/loose_pieces.h"
 #include "engine/undersides/underside_target.h"
 #include "io/quote.h"
+#include "io/resume.h"
 #include "io/slabwright.h"
 #include "io/write/stl_writer.h"
 #include "kernels/features/unmade_air.h"
@@ -24,6 +27,7 @@
 #include "tests/support/command.h"
 #include "tests/support/files.h"
 #include "tests/support/schema.h"
+#include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tunnels.h"
 
@@ -34,6 +38,14 @@ using nlohmann::json;
 using support::slurp;
 using support::spit;
 using support::TemporaryFolder;
+
+ResumeOptions finished(int step, std::optional<int> remake = std::nullopt) {
+    ResumeOptions options;
+    options.after = step;
+    options.remake = remake;
+    options.now_s = 1'795'617'730;
+    return options;
+}
 
 /// The default job with slabs milled on both sides, and a drill for dowels of 8 mm.
 Job two_sided() {
@@ -237,25 +249,115 @@ TEST_F(TwoSided, WhatDoesNotGoWithItIsRefused) {
     EXPECT_EQ(refused([](Job& job) { job.layers.sides = SlabSides::one; }), "undercut.unmade");
 }
 
-TEST_F(TwoSided, CommandsThatDoNotKnowItSaySo) {
+TEST_F(TwoSided, ABuildKilledAfterAnyStepGoesOnFromDisk) {
+    Context context;
+    const auto steps_of = [](const std::string& folder) {
+        return json::parse(slurp(folder + "/sequence.json"))["steps"];
+    };
+    for (const std::string& folder : {built_->out, built_->undersides.at(0)}) {
+        const json steps = steps_of(folder);
+        for (std::size_t after = 0; after <= steps.size(); ++after) {
+            (void)resume_build(context, folder, finished(static_cast<int>(after)));
+            if (after == 1) {  // when the slab is milled from below and not turned yet
+                EXPECT_EQ(support::schema_complaint(slurp(folder + "/progress.json"),
+                                                    SLABWRIGHT_SOURCE_DIR "/io/progress.schema.json"),
+                          "");
+            }
+            // What is on disk is what the steps bring about.
+            const ResumeStatus status = resume_build(context, folder, {});
+            EXPECT_EQ(status.after, static_cast<int>(after));
+            EXPECT_NE(resume_text(status, folder).find("check"), std::string::npos);
+        }
+        std::filesystem::remove(folder + "/progress.json");
+    }
+    // A state that says otherwise is refused.
+    (void)resume_build(context, built_->out, finished(2));
+    const std::string file = built_->out + "/progress.json";
+    json progress = json::parse(slurp(file));
+    ASSERT_EQ(progress["state"]["undersides"].size(), 1U) << progress["state"].dump();
+    for (json& of : progress["state"]["undersides"]) of = json::array({1, 0});
+    spit(file, progress.dump());
+    try {
+        (void)resume_build(context, built_->out, {});
+        ADD_FAILURE() << "a slab that is not turned is taken for turned";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), "resume.state");
+    }
+    std::filesystem::remove(file);
+}
+
+TEST_F(TwoSided, ALayerIsMadeAgainWhereItsSlabNeedsNoUnderside) {
+    Context context;
+    const json steps = json::parse(slurp(built_->out + "/sequence.json"))["steps"];
+    const auto last_of = [&](const char* action, int layer) {
+        int id = 0;
+        for (const json& step : steps)
+            if (step["action"] == action && step["layer"] == layer) id = step["id"];
+        return id;
+    };
+    const int turned = built_->plan["layers"].size() == 2 ? 2 : 0;
+    ASSERT_EQ(turned, 2) << "the tunnel's upper half is milled from below";
+    const std::string progress = built_->out + "/progress.json", remade = built_->out + "/resume_001";
+    const ResumeStatus again = resume_build(context, built_->out, finished(last_of("mill", 1), 1));
+    int slabs = 0;
+    for (std::size_t i = static_cast<std::size_t>(again.after); i < again.steps.size(); ++i) {
+        EXPECT_NE(again.steps[i].action, "mill_underside");
+        EXPECT_NE(again.steps[i].action, "turn_over");
+        slabs += again.steps[i].action == "place";
+    }
+    EXPECT_EQ(slabs, 2);
+    std::filesystem::remove_all(remade);
+    std::filesystem::remove(progress);
+    const auto refused = [&](const std::string& folder, int after, int layer) -> std::string {
+        try {
+            (void)resume_build(context, folder, finished(after, layer));
+        } catch (const Error& error) {
+            EXPECT_NE(error.remedy(), "");
+            return error.code();
+        }
+        return "made";
+    };
+    EXPECT_EQ(refused(built_->out, last_of("mill", 2), 2), "resume.underside");
+    EXPECT_EQ(refused(built_->out, last_of("mill", 2), 1), "resume.underside");
+    EXPECT_EQ(refused(built_->undersides.at(0), 1, 2), "resume.turned");
+    EXPECT_FALSE(std::filesystem::exists(progress)) << "what is refused writes nothing";
+}
+
+TEST_F(TwoSided, AQuoteSaysWhatThePlanSays) {
+    Context context;
+    const QuotedModel quoted = quote_model(context, built_->stl, two_sided());
+    const Quote& q = quoted.quote;
+    const json& totals = built_->plan["totals"];
+    EXPECT_EQ(q.outcome.layers, static_cast<int>(built_->plan["layers"].size()));
+    EXPECT_EQ(q.undersides, 1);
+    EXPECT_LT(q.outcome.unmade_mm3, 1);
+    const double minutes = totals["build_minutes"], below = totals["underside_minutes"];
+    EXPECT_NEAR(q.build_minutes, minutes, 0.5 * minutes);
+    EXPECT_NEAR(q.underside_minutes, below, 0.5 * below);
+    EXPECT_NEAR(q.build_minutes,
+                q.cutting_minutes + q.bonding_minutes + q.tool_change_minutes + q.underside_minutes, 1e-9);
+    EXPECT_NE(quote_text(quoted).find("1 of the slabs is milled from below first"), std::string::npos)
+        << quote_text(quoted);
+    EXPECT_NE(quote_json(quoted).find("\"undersides\": 1"), std::string::npos) << quote_json(quoted);
+}
+
+TEST_F(TwoSided, CommandsSayWhatTheyCannotDo) {
     const auto told = [&](std::vector<std::string> arguments) {
         arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
         return support::run_command(arguments);
     };
-    const support::CommandResult resumed = told({"resume", built_->out});
-    EXPECT_EQ(resumed.exit, 2) << resumed.err;
-    EXPECT_NE(resumed.err.find("both sides"), std::string::npos) << resumed.err;
     // The option brings two dowels a joint with it; those of 8 mm are too narrow for the fixed library.
     const support::CommandResult other =
         told({"plan", built_->stl, "--sides", "two", "-o", built_->folder / "other"});
     EXPECT_EQ(other.exit, 2) << other.err;
     EXPECT_NE(other.err.find("or take dowels.diameter = 18, whose holes T2 makes"), std::string::npos)
         << other.err;
+    const support::CommandResult quoted = told({"quote", built_->stl, "--sides", "two"});
+    EXPECT_EQ(quoted.exit, 0) << quoted.err;
+    EXPECT_NE(quoted.out.find("1 of the slabs is milled from below first"), std::string::npos) << quoted.out;
     const support::CommandResult alone = told({"verify", built_->undersides.at(0)});
     EXPECT_NE(alone.exit, 0);
     EXPECT_NE(alone.err.find("underside"), std::string::npos) << alone.err;
-    Context context;
-    EXPECT_THROW((void)quote_model(context, built_->stl, two_sided()), Error);
 }
 
 TEST_F(TwoSided, AFolderWithUndersidesIsReplacedAsAPlanAndKeptWithAStranger) {
@@ -275,6 +377,87 @@ TEST_F(TwoSided, AutomaticMillsFromBelowOnlyWhereThatMakesMore) {
     const std::string block = built_->folder / "block.stl";
     write_stl(block, weld(context, shapes::box({0, 0, 0}, {100, 70, 36})));
     EXPECT_TRUE(plan(context, block, job).undersides.empty());
+}
+
+/// A small block with a tunnel of radius 10 along y, planned and written by a job.
+struct SmallBuild {
+    explicit SmallBuild(const Job& job) {
+        Context context;
+        write_stl(stl, weld(context, support::block_with_tunnels({0, 0, 0}, {60, 40, 30}, {{30, 15, 10}})));
+        const std::shared_ptr<Pattern> pattern = read_pattern(context, stl, job);
+        Plan made = plan(context, *pattern, job);
+        result = write_proven(context, made, out, pattern, true);
+        for (const Plan& under : made.undersides)
+            undersides.push_back(out + "/" + underside_folder(under.turned->layer));
+    }
+    [[nodiscard]] std::set<std::string> codes() const {
+        Context context;
+        std::set<std::string> found;
+        for (const Diagnostic& d : verify(context, out, stl, "", 1).violations) found.insert(d.code);
+        return found;
+    }
+    TemporaryFolder folder;
+    std::string stl = folder / "tunnel.stl", out = folder / "out";
+    VerifyResult result;
+    std::vector<std::string> undersides;
+};
+
+// A clamp on the slabs' left front corner, a fence on the board before them, and a pad beside them on which z
+// 0 is found: of the undersides too, whose slabs lie with that corner where the board has its own.
+TEST(TwoSidedTable, KeepOutsAndProbingHoldForUndersides) {
+    Job job = two_sided();
+    job.machine.table = BuildTable::fixed;
+    job.machine.travel_z = 400;
+    job.machine.probe = ProbeMode::cycle;
+    job.probing.reference = {-40, 20, 30};
+    job.machine.zero = WorkZero::model;
+    const double margin = job.slabs.margin;
+    KeepOut fence;
+    fence.name = "fence";
+    fence.rectangle = {-margin, -margin - 80, 60 + margin, -margin - 70};
+    fence.height = 60;
+    fence.clearance = 2;
+    job.machine.keep_outs = {fence};
+    const SmallBuild built(job);
+    for (const Diagnostic& d : built.result.violations) ADD_FAILURE() << d.code << ": " << d.message;
+    ASSERT_EQ(built.undersides.size(), 1U);
+    const json under = json::parse(slurp(built.undersides[0] + "/plan.json"));
+    EXPECT_EQ(under["probes"].size(), 1U);
+    // Were it in the middle, programs of both sides would run into it.
+    std::vector<KeepOut> other{fence};
+    other[0].rectangle = {28, 18, 34, 24};
+    std::set<std::string> files;
+    Context context;
+    for (const Diagnostic& d : verify(context, built.out, built.stl, "", 1, &other).violations)
+        if (d.code == "keep_out.cut") files.insert(d.message.substr(0, d.message.find('/')));
+    EXPECT_TRUE(files.contains("undersides")) << fmt::format("{}", fmt::join(files, " "));
+    // The slab of an underside lies with its left front corner where the board has its own: what is there is
+    // entered.
+    job.machine.keep_outs[0].rectangle = {-margin, -margin - 30, -margin + 5, -margin + 5};
+    try {
+        (void)plan(context, built.stl, job);
+        ADD_FAILURE() << "planned";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), "keep_out.entered");
+    }
+}
+
+TEST(TwoSidedTable, AControlHoldsAllProgramsByTheirNumbers) {
+    Job job = two_sided();
+    job.machine.post = Post::fanuc;
+    const SmallBuild built(job);
+    for (const Diagnostic& d : built.result.violations) ADD_FAILURE() << d.code << ": " << d.message;
+    ASSERT_EQ(built.undersides.size(), 1U);
+    const json under = json::parse(slurp(built.undersides[0] + "/plan.json"));
+    const std::string file =
+        built.undersides[0] + "/" + under["layers"][0]["operations"][0]["file"].get<std::string>();
+    std::string text = slurp(file);
+    const std::size_t number = text.find("\nO");
+    ASSERT_NE(number, std::string::npos);
+    EXPECT_EQ(text.substr(number + 1, 5), fmt::format("O{:02}51", under["layers"][0]["index"].get<int>()));
+    text.replace(number + 4, 2, "01");
+    spit(file, text);
+    EXPECT_TRUE(built.codes().contains("program.number"));
 }
 
 /// A slab of 19 mm in a block of 60 x 40 x 18 mm, with 10 mm around it.
@@ -333,6 +516,70 @@ TEST(UndersideTarget, WhatLiesInItsWebStaysUnmade) {
     EXPECT_NEAR(left({18, MilledFrom::both_sides, 3}), 2 * mm2, 0.05 * 2 * mm2);
     const MilledLayer strips{18, MilledFrom::both_sides, 3, 20, 5, 0, 0};
     EXPECT_NEAR(left(strips), 2 * mm2 / 4, 0.15 * 2 * mm2 / 4);
+}
+
+/// The floor of a layer over what is milled from below.
+std::optional<LoadedFloor> floor_of(const shapes::Facets& facets, const MilledLayer& layer, double bottom,
+                                    const FloorLoads& loads, double cell = 0.5) {
+    Context context;
+    const Mesh pattern = weld(context, facets);
+    const AirGaps gaps = air_gaps(context, pattern.view(), cell);
+    return FloorMap(context, pattern.view(), gaps).weakest(context, layer, bottom, loads);
+}
+
+// Roofs of any thickness over air between two walls, or beyond one: how thick they are, how far they reach
+// and what they bear is as the plate says.
+TEST(UndersideFloors, BearWhatPlatesBear) {
+    const unsigned seed = test::seed();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const auto between = [&](double low, double high) {
+        return low + (high - low) * static_cast<double>(random()) / static_cast<double>(std::mt19937::max());
+    };
+    for (int round = 0; round < 12; ++round) {
+        SCOPED_TRACE(round);
+        const bool bridge = round % 2 == 0, goes_on = round % 3 == 0;
+        const double t = between(0.6, 3), span = between(8 * t, 40), wide = 100 + span;
+        const auto box = [](double x0, double x1, double z0, double z1) {
+            return shapes::box({static_cast<float>(x0), 0, static_cast<float>(z0)},
+                               {static_cast<float>(x1), static_cast<float>(90), static_cast<float>(z1)});
+        };
+        shapes::Facets facets = box(0, 50, 0, 18);
+        if (bridge) shapes::append(facets, box(50 + span, wide, 0, 18));
+        shapes::append(facets, box(20, bridge ? wide - 20 : 50 + span, 18 - t, 18));
+        if (goes_on) shapes::append(facets, box(20, bridge ? wide - 20 : 50 + span, 17.9, 30));
+        const MilledLayer layer{18, MilledFrom::both_sides, 0};
+        const FloorLoads loads{between(5, 60), between(0, 0.5)};
+        const auto floor = floor_of(facets, layer, 0, loads);
+        ASSERT_TRUE(floor);
+        const double reach = bridge ? span / 2 : span;
+        EXPECT_NEAR(floor->thickness_mm, t, 1e-3);
+        EXPECT_NEAR(floor->at[2], 18 - t, 1e-3);
+        EXPECT_NEAR(floor->push_mpa, 6 * 0.51 * loads.push_n / (t * t), 0.01 * floor->push_mpa);
+        if (goes_on && floor->press_mpa > floor->push_mpa) {
+            const double a = floor->reach_mm / t;
+            EXPECT_NEAR(floor->reach_mm, reach, 2);
+            // At its open ends a bridge is held from both sides all the same, but air is nearer there.
+            EXPECT_GE(floor->press_mpa, 1.99 * loads.pressure_mpa * a * a);
+            EXPECT_LE(floor->press_mpa, 3.01 * loads.pressure_mpa * a * a);
+            if (!bridge) {
+                EXPECT_NEAR(floor->press_mpa, 3 * loads.pressure_mpa * a * a, 0.01 * floor->press_mpa);
+            }
+        }
+        if (!goes_on) {
+            EXPECT_EQ(floor->press_mpa, 0) << "no slab is glued onto it";
+        }
+        const Diagnostic told = weak_floor(3, *floor, loads, 27);
+        EXPECT_EQ(told.code, "floor.weak");
+        EXPECT_EQ(told.where, floor->at);
+        EXPECT_NE(told.message.find(fmt::format("layer 3: a floor {:.1f} mm thick", t)), std::string::npos);
+    }
+    // A short one is part of what carries it, and a solid block has none.
+    shapes::Facets lip = shapes::box({0, 0, 0}, {50, 90, 18});
+    shapes::append(lip, shapes::box({40, 0, 14}, {58, 90, 18}));
+    const MilledLayer layer{18, MilledFrom::both_sides, 0};
+    EXPECT_FALSE(floor_of(lip, layer, 0, {10, 0.5}));
+    EXPECT_FALSE(floor_of(shapes::box({0, 0, 0}, {50, 90, 18}), layer, 0, {10, 0.5}));
 }
 
 }  // namespace

@@ -35,6 +35,7 @@
 #include "tools/progress_bar.h"
 #include "tools/resume_command.h"
 #include "tools/sheets_command.h"
+#include "tools/sides_option.h"
 #include "tools/split_command.h"
 #include "tools/streams.h"
 
@@ -379,13 +380,7 @@ CLI::App* add_plan_command(CLI::App& app, Options& options) {
     add_common(*command, options);
     command->add_option("--strategy", options.strategy, "of layer placement: optimal, printed or combined")
         ->check(CLI::IsMember({"optimal", "printed", "combined"}));
-    command
-        ->add_option(
-            "--sides", options.sides,
-            "of slabs that are milled: one, the top; two, the underside too where there are "
-            "overhangs; or auto, two where that makes more. Not one: two dowels in a joint where the "
-            "job gives none")
-        ->check(CLI::IsMember({"one", "two", "auto"}));
+    add_sides_option(*command, options.sides);
     command->add_option("--finder", options.finder, "of features: exact, halving or both")
         ->check(CLI::IsMember({"exact", "halving", "both"}));
     command
@@ -431,6 +426,7 @@ CLI::App* add_quote_command(CLI::App& app, Options& options) {
         "quote",
         "what a build takes, without a plan: layers, slabs, glue, about how long, what stays unmade");
     command->add_option("MODEL", options.stl, "the pattern")->required();
+    add_sides_option(*command, options.sides);
     add_common(*command, options);
     return command;
 }

@@ -17,6 +17,7 @@ constexpr double kFinestLevel = 0.02;    // mm
 constexpr double kStep = 1e-4;           // of the air between solid and solid
 constexpr double kLayerOfAir = 1e-3;     // of it: what one layer more must make
 constexpr double kLayerOfBox = 3e-5;     // or that of the part's box, where that is more
+constexpr double kThinFloor = 3;         // mm of wood that a boundary leaves over a recess: less is thin
 constexpr double kShareOfEnds = 1e-3;    // of all gaps, that makes an end frequent
 
 /// Calls f(gap) for what must be stabbed.
@@ -119,8 +120,35 @@ std::vector<Stabbed> stabbed_gaps(const std::vector<Ticks>& heights, const AirGa
     return found;
 }
 
+/// mm² of each candidate where a boundary there leaves a floor, over air that is milled from below, thinner
+/// than it need be: the part goes on above it.
+std::vector<double> thin_floors(const std::vector<Ticks>& heights, const AirGaps& gaps) {
+    std::vector<double> change(heights.size() + 1, 0);
+    const double mm2 = gaps.grid.cell * gaps.grid.cell;
+    const auto first_over = [&](double mm) {
+        return static_cast<std::size_t>(std::upper_bound(heights.begin(), heights.end(), to_ticks(mm)) -
+                                        heights.begin());
+    };
+    for (const std::vector<AirGap>& row : gaps.rows) {
+        std::uint32_t column = UINT32_MAX;
+        double solid_top = gaps.top;  // over the gap; of a line's uppermost solid it is not known
+        for (const AirGap& gap : row) {
+            if (gap.column != column) column = gap.column, solid_top = gaps.top;
+            const std::size_t from = first_over(gap.high + kLeastGap),
+                              to = first_over(
+                                  std::min(gap.high + kThinFloor - kLeastGap, solid_top - kLeastGap));
+            if (from < to) change[from] += mm2, change[to] -= mm2;
+            solid_top = gap.low;
+        }
+    }
+    for (std::size_t i = 1; i < change.size(); ++i) change[i] += change[i - 1];
+    change.pop_back();
+    return change;
+}
+
 struct Cost {
-    std::int64_t steps = 0;  ///< of air that stays
+    std::int64_t steps = 0;     ///< of air that stays
+    std::int64_t thin_mm2 = 0;  ///< of floors that are thinner than they need be
     CostUnits rest;
     friend auto operator<=>(const Cost&, const Cost&) = default;
 };
@@ -134,10 +162,11 @@ struct Way {
 class Search {
 public:
     Search(const LayerRules& rules, const std::vector<Ticks>& heights, const std::vector<Stabbed>& gaps,
-           const BothSidesWeights& weights)
+           const std::vector<double>& thin_mm2, const BothSidesWeights& weights)
         : rules_(rules),
           heights_(heights),
           gaps_(gaps),
+          thin_mm2_(thin_mm2),
           step_(weights.step_mm3),
           layer_(weights.layer_mm3),
           ways_(heights.size()) {
@@ -183,6 +212,7 @@ private:
         Cost cost = ways_[a].cost;
         cost.steps += std::llround((held_[a] + layer_) / step_);
         if (ways_[b].reached && cost.steps > ways_[b].cost.steps) return;
+        cost.thin_mm2 += std::llround(thin_mm2_[b]);
         cost.rest += rules_.class_cost(c);
         cost.rest += rules_.slab_joints_cost(heights_[a], c);
         cost.rest += joints_[b];
@@ -193,6 +223,7 @@ private:
     const LayerRules& rules_;
     const std::vector<Ticks>& heights_;
     const std::vector<Stabbed>& gaps_;
+    const std::vector<double>& thin_mm2_;  // at each candidate
     double step_, layer_;
     std::vector<Way> ways_;
     std::vector<CostUnits> joints_;
@@ -218,7 +249,8 @@ LayerPlacement place_layers_both_sides(const LayerRequest& request, const AirGap
             static_cast<double>(grid.rows * grid.columns) * grid.cell * grid.cell * request.height;
         weighed.layer_mm3 = std::max(kLayerOfAir * air, kLayerOfBox * box);
     }
-    Search search(rules, heights, stabbed, weighed);
+    const std::vector<double> thin = thin_floors(heights, gaps);
+    Search search(rules, heights, stabbed, thin, weighed);
     std::vector<Ticks> tops = search.run(to_ticks(request.min_layer) - kSame);
     if (tops.empty()) tops = search.run(1);
     LayerPlacement placement;

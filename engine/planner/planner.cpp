@@ -211,7 +211,10 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     const std::vector<std::vector<StandingFoot>> feet = standing_feet(context, plan, joints);
     const double cut = gaps == nullptr ? 1 : kTopShare;
     cut_layers(context, plan, pattern, joints, feet, {share.from, share.at(cut)}, origin);
-    if (gaps != nullptr) plan_undersides(context, plan, pattern, milled, {share.at(cut), share.to});
+    if (gaps != nullptr) {
+        warn_of_floors(context, plan, pattern, *gaps, milled);
+        plan_undersides(context, plan, pattern, milled, {share.at(cut), share.to}, origin);
+    }
 
     context.begin_phase("schedule", share.at(0.99), share.at(1));
     load_joints(context, plan, joints, origin);

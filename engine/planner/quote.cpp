@@ -4,16 +4,23 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
+#include <span>
+#include <vector>
 
 #include "engine/moves/thinning.h"
 #include "engine/plan.h"
+#include "engine/planner/underside.h"
 #include "engine/schedule/blanks.h"
 #include "engine/schedule/fit.h"
 #include "engine/schedule/glue_path.h"
 #include "engine/tools/tools.h"
+#include "engine/undersides/underside_target.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/errors.h"
 #include "kernels/features/facet_classes.h"
+#include "kernels/features/filled_columns.h"
+#include "kernels/features/unmade_air.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/loops.h"
 #include "kernels/slicing/slicing.h"
@@ -40,6 +47,7 @@ constexpr Rates kRates{};
 constexpr double kSmallPlace = 150;  // mm: a loop so long counts as half a place
 constexpr double kSeenTurn = 0.03;   // mm from a loop's chords, within which it may turn
 constexpr double kChanges = 3.2;     // of tools in a layer
+constexpr double kHandlings = 4;     // of a slab that is milled from below
 constexpr double kThin = 8;          // mm: walls that are thinner count
 constexpr double kSeenWidth = 0.05;  // mm, to which widths of wood and air are measured
 
@@ -143,7 +151,30 @@ struct SurfaceWays {
     double contours = 0, raster = 0;  // mm
 };
 
-void add_surface(Context& context, MeshView mesh, const Job& job, const LayerTools& tools, Ways& ways) {
+/// Heights, mm.
+struct HeightSpan {
+    double low = -kUnbounded, high = kUnbounded;
+};
+
+/// The share of a facet that lies under z.
+double share_below(const std::array<double, 3>& corners, double z) {
+    const auto& [a, b, c] = corners;
+    if (z <= a) return 0;
+    if (z >= c) return 1;
+    return z < b ? (z - a) * (z - a) / ((b - a) * (c - a)) : 1 - (c - z) * (c - z) / ((c - b) * (c - a));
+}
+
+/// The share of a facet that lies between two heights.
+double share_of(MeshView mesh, std::uint32_t facet, const HeightSpan& between) {
+    if (between.low == -kUnbounded && between.high == kUnbounded) return 1;
+    std::array<double, 3> corners{};
+    for (std::size_t k = 0; k < 3; ++k) corners[k] = mesh.vertices[mesh.facets[facet][k]].z;
+    std::sort(corners.begin(), corners.end());
+    return share_below(corners, between.high) - share_below(corners, between.low);
+}
+
+void add_surface(Context& context, MeshView mesh, const Job& job, const LayerTools& tools,
+                 const HeightSpan& between, Ways& ways) {
     const double ball = tools.finish.diameter / 2, cusp = job.tolerances.cusp,
                  most = tools.finish.stepdown_max;
     constexpr std::size_t grain = std::size_t{1} << 14;
@@ -155,7 +186,8 @@ void add_surface(Context& context, MeshView mesh, const Job& job, const LayerToo
                 const Vec3d n = area_normal(mesh, static_cast<std::uint32_t>(f));
                 const double twice = length(n);
                 if (!(twice > 0)) continue;
-                const double mm2 = twice / 2, slope = std::acos(std::clamp(n[2] / twice, -1.0, 1.0));
+                const double mm2 = twice / 2 * share_of(mesh, static_cast<std::uint32_t>(f), between);
+                const double slope = std::acos(std::clamp(n[2] / twice, -1.0, 1.0));
                 const double degrees = slope * 180 / std::numbers::pi;
                 if (degrees >= kUpright || degrees <= kLevel) continue;
                 if (degrees > kSteep) {
@@ -215,42 +247,103 @@ double changes_of(const Machine& machine) {
     return probed ? kChanges + 1 : kChanges;
 }
 
-Job quotable(const Job& job) {
-    if (job.layers.sides != SlabSides::one)
-        throw refusal("quote.sides", "slabs milled on both sides cannot be quoted yet", "layers.sides",
-                      "plan the pattern, or quote it with layers.sides = \"one\"");
-    return with_cutting_data(job);
-}
-
-}  // namespace
-
-Quote quote(Context& context, MeshView mesh, const Job& asked) {
-    const Job job = quotable(asked);
-    Plan plan;
-    plan.job = job;
-    const Box3 box = bounds(context, mesh);
-    place_stock(plan, box);
-    const LayersOf layers = layers_of(context, mesh, job);
-    const LayerTools tools = fixed_tools(job);
-    const Tool& face = face_mill(job);
-    Quote result;
-    result.outcome = layers.lying;
-    result.stock = {plan.stock_max[0] - plan.stock_min[0], plan.stock_max[1] - plan.stock_min[1]};
-    plan.layers = slabbed_layers(job.slabs, layers.tops);
-    saw_blanks(context, mesh, plan);
-    result.boards = cut_list(plan);
-
-    const std::vector<SectionCount> counts = count_sections(context, mesh, plan, layers.tops, tools, face);
-    Ways ways;
+/// Adds what sections count.
+void add_counts(std::span<const SectionCount> counts, Ways& ways) {
     for (const SectionCount& count : counts) {
         ways.places += count.places;
         ways.turns += count.turns;
         ways.thin += count.thin;
         ways.narrow += count.narrow;
     }
+}
+
+/// mm² of three sections from below, in each of which what is under it stays filled.
+std::array<double, 3> filled_areas(std::span<const SectionCount> counts) {
+    std::array<double, 3> areas{};
+    for (std::size_t k = 3; k-- > 0;) areas[k] = std::max(counts[k].mm2, k < 2 ? areas[k + 1] : 0);
+    return areas;
+}
+
+/// Simpson's rule.
+double mean_area(const std::array<double, 3>& areas) { return (areas[0] + 4 * areas[1] + areas[2]) / 6; }
+
+/// The slabs that are milled from below.
+class Undersides {
+public:
+    Undersides(Context& context, MeshView mesh, const Plan& plan)
+        : context_(context), mesh_(mesh), plan_(plan) {}
+
+    /// @returns how many there are
+    int add(const std::vector<MilledLayer>& milled, const LayerTools& tools, const Tool& face, Ways& ways) {
+        int count = 0;
+        for (std::size_t l = 0; l < milled.size(); ++l) {
+            if (milled[l].milled != MilledFrom::both_sides) continue;
+            ++count;
+            add(turned_slab(plan_, plan_.layers[l], milled[l].web), tools, face, ways);
+        }
+        return count;
+    }
+
+private:
+    void add(const TurnedSlab& slab, const LayerTools& tools, const Tool& face, Ways& ways) {
+        const Mesh target = underside_target(context_, mesh_, slab);
+        const double floor = recess_floor(slab), top = slab.slab_thickness, height = top - floor;
+        const double beside = std::min(kBeside, height / 4);
+        const std::vector<Plane> planes{
+            {floor + beside, Side::above}, {(floor + top) / 2, Side::above}, {top - beside, Side::above}};
+        const std::vector<Section> sections = slice(context_, target.view(), planes);
+        std::array<SectionCount, 3> counts;
+        parallel_each(context_, counts.size(), [&](std::size_t k) {
+            counts[k] = count_section(sections[k].loops, height / 3, tools, face);
+        });
+        add_counts(counts, ways);
+        const Box3 tray = bounds(context_, target.view());
+        const double whole = (double{tray.max.x} - tray.min.x) * (double{tray.max.y} - tray.min.y);
+        ways.roughing += std::max(0.0, whole - mean_area(filled_areas(counts))) * height / swath(tools.rough);
+        add_surface(context_, target.view(), plan_.job, tools, {floor, top}, ways);
+    }
+
+    Context& context_;
+    MeshView mesh_;
+    const Plan& plan_;
+};
+
+/// Layers as a plan would have them, and which slabs are milled from below.
+struct QuotedLayers {
+    LayersOf layers;
+    std::optional<AirGaps> gaps;  ///< none: all slabs are milled from above
+};
+
+QuotedLayers quoted_layers(Context& context, MeshView mesh, const Job& job) {
+    if (job.layers.sides == SlabSides::one) return {layers_of(context, mesh, job), std::nullopt};
+    check_two_sided(job, mesh);
+    const LayerRequest request = quick_layer_request(context, mesh, job);
+    QuotedLayers found;
+    found.gaps = air_gaps(context, mesh, filled_cell(mesh));
+    const LayerPlacement placement =
+        place_two_sided(context, job, request, *found.gaps, place_layers(job.layers.strategy, request));
+    for (const Boundary& b : placement.boundaries) found.layers.tops.push_back(b.z);
+    found.layers.lying.layers = static_cast<int>(found.layers.tops.size());
+    found.layers.lying.has_room = has_room(bounds(context, mesh), job);
+    return found;
+}
+
+/// What stays filled, higher than tolerances.undercut.
+void tell_unmade(const UnmadeAir& left, double undercut, Lying& outcome) {
+    for (const UnmadePocket& pocket : left.pockets) {
+        if (pocket.height_mm <= undercut) continue;
+        outcome.unmade_mm3 += pocket.volume_mm3;
+        outcome.unmade_mm = std::max(outcome.unmade_mm, pocket.height_mm);
+    }
+}
+
+/// Slabs, wood and glue, and what facing and roughing from above take.
+/// @param counts three of each layer
+void reckon_layers(const Plan& plan, const Box3& box, std::span<const SectionCount> counts,
+                   const LayerTools& tools, const Tool& face, Quote& result, Ways& ways) {
     std::map<double, int> slabs;
     double stack_mm3 = 0;
-    for (std::size_t l = 0; l < layers.tops.size(); ++l) {
+    for (std::size_t l = 0; l < plan.layers.size(); ++l) {
         const Layer& layer = plan.layers[l];
         const double height = layer.z_top - layer.z_bottom, stock_mm2 = slab_of(plan, layer).mm2();
         const int together = layer.slabs;
@@ -258,29 +351,28 @@ Quote quote(Context& context, MeshView mesh, const Job& asked) {
         slabs[slab] += together;
         result.slab_m2 += together * stock_mm2 * 1e-6;
         stack_mm3 += stock_mm2 * slab * together;
-        std::array<double, 3> area_at{};
-        for (std::size_t k = 3; k-- > 0;) {
-            area_at[k] = counts[3 * l + k].mm2;
-            if (k < 2) area_at[k] = std::max(area_at[k], area_at[k + 1]);  // what is under it stays filled
-        }
-        const double solid_mm3 = (area_at[0] + 4 * area_at[1] + area_at[2]) / 6 * height;
+        const std::array<double, 3> area_at = filled_areas(counts.subspan(3 * l, 3));
         const double takes = slab * together - height;
         ways.facing += std::ceil(std::max(takes, 1e-3) / face.stepdown_max) * stock_mm2 /
                        (face.diameter * face.stepover);
-        ways.roughing += std::max(0.0, stock_mm2 * height - solid_mm3) / swath(tools.rough);
+        ways.roughing += std::max(0.0, stock_mm2 - mean_area(area_at)) * height / swath(tools.rough);
         const double below = l == 0 ? area_at[0] : counts[3 * l - 1].mm2;
         const double glued = std::min(area_at[0], below);
         result.glue_m2 += glued * 1e-6;
-        result.bonding_minutes += bonding_minutes(job, box, glued, slab_of(plan, layer), together);
+        result.bonding_minutes += bonding_minutes(plan.job, box, glued, slab_of(plan, layer), together);
     }
-    add_surface(context, mesh, job, tools, ways);
     for (const auto& [thickness, count] : slabs) result.slabs.push_back({thickness, count});
-    const double layer_count = static_cast<double>(layers.tops.size());
-    result.mass_kg = (stack_mm3 + result.stock[0] * result.stock[1] * job.machine.base_board_thickness) *
-                     1e-9 * job.material.density_kg_m3;
+    result.mass_kg = (stack_mm3 + result.stock[0] * result.stock[1] * plan.job.machine.base_board_thickness) *
+                     1e-9 * plan.job.material.density_kg_m3;
+}
+
+/// What the ways take on the machine.
+std::vector<QuotedWork> work_of(const Ways& ways, const LayerTools& tools, const Tool& face,
+                                const Machine& machine) {
+    std::vector<QuotedWork> found;
     const auto work = [&](std::string_view name, double mm, const Tool& tool, double rate) {
-        const double ideal = mm / std::min(tool.max_feed, job.machine.max_feed);
-        result.work.push_back({name, ideal, rate * ideal});
+        const double ideal = mm / std::min(tool.max_feed, machine.max_feed);
+        found.push_back({name, ideal, rate * ideal});
     };
     work("facing", ways.facing, face, kRates.facing);
     work("roughing", ways.roughing, tools.rough, kRates.roughing);
@@ -288,17 +380,63 @@ Quote quote(Context& context, MeshView mesh, const Job& asked) {
     work("raster", ways.raster, tools.finish, kRates.raster);
     work("thin walls", ways.thin, tools.finish, kRates.thin);
     work("narrow places", ways.narrow, tools.rough, kRates.narrow);
-    result.work.push_back({"places", ways.places, kRates.place * ways.places});
-    result.work.push_back({"turns", 0, kRates.turn * ways.turns});
-    for (const QuotedWork& w : result.work) result.cutting_minutes += w.minutes;
-    result.tool_change_minutes = changes_of(job.machine) * layer_count * job.machine.tool_change_s / 60;
-    result.build_minutes = result.cutting_minutes + result.bonding_minutes + result.tool_change_minutes;
+    found.push_back({"places", ways.places, kRates.place * ways.places});
+    found.push_back({"turns", 0, kRates.turn * ways.turns});
+    return found;
+}
+
+double minutes_of(const std::vector<QuotedWork>& work) {
+    double sum = 0;
+    for (const QuotedWork& w : work) sum += w.minutes;
+    return sum;
+}
+
+}  // namespace
+
+Quote quote(Context& context, MeshView mesh, const Job& asked) {
+    const Job job = with_cutting_data(asked);
+    Plan plan;
+    plan.job = job;
+    const Box3 box = bounds(context, mesh);
+    place_stock(plan, box);
+    const QuotedLayers found = quoted_layers(context, mesh, job);
+    const std::vector<double>& tops = found.layers.tops;
+    const LayerTools tools = fixed_tools(job);
+    const Tool& face = face_mill(job);
+    Quote result;
+    result.outcome = found.layers.lying;
+    result.stock = {plan.stock_max[0] - plan.stock_min[0], plan.stock_max[1] - plan.stock_min[1]};
+    plan.layers = slabbed_layers(job.slabs, tops);
+    saw_blanks(context, mesh, plan);
+    result.boards = cut_list(plan);
+
+    const std::vector<SectionCount> counts = count_sections(context, mesh, plan, tops, tools, face);
+    Ways ways, below;
+    add_counts(counts, ways);
+    reckon_layers(plan, box, counts, tools, face, result, ways);
+    add_surface(context, mesh, job, tools, {}, ways);
+    if (found.gaps) {
+        const std::vector<MilledLayer> milled = milled_layers(context, plan, mesh, *found.gaps);
+        tell_unmade(unmade_air(context, *found.gaps, milled), job.tolerances.undercut, result.outcome);
+        result.undersides = Undersides(context, mesh, plan).add(milled, tools, face, below);
+    }
+    result.work = work_of(ways, tools, face, job.machine);
+    result.cutting_minutes = minutes_of(result.work);
+    const double changes = changes_of(job.machine) * job.machine.tool_change_s / 60;
+    result.tool_change_minutes = changes * static_cast<double>(tops.size());
+    // A slab is taken, laid on the spoil board, held there and turned.
+    if (result.undersides > 0)
+        result.underside_minutes =
+            minutes_of(work_of(below, tools, face, job.machine)) +
+            result.undersides * (changes + kHandlings * job.bonding.handling_s / 3 / 60);
+    result.build_minutes = result.cutting_minutes + result.bonding_minutes + result.tool_change_minutes +
+                           result.underside_minutes;
     Amounts amounts = amounts_of(plan, result.boards);
     amounts.glue_m2 = result.glue_m2;
     amounts.minutes = result.build_minutes;
     // As many as are asked for: places for them are found by a plan.
     amounts.dowels =
-        (std::max<std::size_t>(layers.tops.size(), 1) - 1) * static_cast<std::size_t>(job.dowels.per_joint);
+        (std::max<std::size_t>(tops.size(), 1) - 1) * static_cast<std::size_t>(job.dowels.per_joint);
     result.cost = cost_of(job, amounts);
     return result;
 }

@@ -83,6 +83,15 @@ Spoilt spoilt_layers(const RemakeRequest& request, const PlannedBuild& build) {
                fmt::format("a slab of layer {} lies on its glue and is not pressed yet", layers[top].index),
                "press it and say --after that step; or lift it off, wipe the glue off, and say --after the "
                "step before the glue");
+    for (std::size_t k = l; k <= top; ++k)
+        if (mills_underside(request.plan, layers[k].index))
+            refuse(
+                ErrorKind::usage, "resume.underside",
+                fmt::format("layer {} would be faced off, and its slab is milled from below before it is "
+                            "laid: another one cannot be while the stack lies on the machine",
+                            layers[k].index),
+                "plan again, or take the stack off, mill another slab by the layer's folder in undersides, "
+                "and go on by hand");
     if (build.whole_layer(state) != top)
         refuse(ErrorKind::usage, "resume.incomplete",
                fmt::format("layer {} has not all of its {} slabs yet", layers[top].index, layers[top].slabs),
@@ -229,8 +238,9 @@ private:
             if (known == now_.end()) needs.insert(base_);  // of what was faced off, or lies under it
             else needs.insert(known->second.begin(), known->second.end());
         }
-        if (own.action == "mount_board" || own.action == "load_feed" || own.action == "load_tool" ||
-            own.action == "tool_change") {
+        // The slabs of layers to come are milled from below and turned already.
+        if (own.action == "mill_underside" || own.action == "turn_over" || own.action == "mount_board" ||
+            own.action == "load_feed" || own.action == "load_tool" || own.action == "tool_change") {
             if (needs.empty()) needs.insert(base_);
             now_[own.id] = {needs.begin(), needs.end()};
             return;

@@ -6,11 +6,15 @@
 #include <string_view>
 #include <utility>
 
+#include "engine/forces/op_forces.h"
 #include "engine/layers/both_sides.h"
 #include "engine/schedule/dowels.h"
 #include "engine/schedule/fit.h"
 #include "engine/schedule/heights.h"
+#include "engine/schedule/keep_outs.h"
+#include "engine/schedule/probes.h"
 #include "engine/schedule/schedule.h"
+#include "engine/undersides/floors.h"
 #include "engine/undersides/loose_pieces.h"
 #include "engine/undersides/underside_target.h"
 
@@ -26,9 +30,10 @@ std::string volume_words(double mm3) {
     return mm3 < 1000 ? fmt::format("{:.0f} mm³", std::max(1.0, mm3)) : fmt::format("{:.1f} cm³", mm3 / 1000);
 }
 
-// The job as it is for one slab that lies upside down on a spoil board.
-Job underside_job(const Job& job, double slab_thickness) {
-    Job own = job;
+// The job as it is for one slab that lies upside down on a spoil board, where the base board lies later.
+Job underside_job(const Plan& plan, double slab_thickness, const std::array<double, 2>& origin) {
+    Job own = plan.job;
+    own.machine.keep_outs = keep_outs_below(plan, origin);
     own.allow_undercut = true;
     own.layers.sides = SlabSides::one;
     own.layers.supports = SupportRule::none;
@@ -42,11 +47,6 @@ Job underside_job(const Job& job, double slab_thickness) {
     return own;
 }
 
-TurnedSlab turned_slab(const Plan& plan, const Layer& layer, double web) {
-    return {layer.index, layer.z_bottom,          layer.z_top, layer.slab_thickness, slab_of(plan, layer),
-            web,         underside_room(plan.job)};
-}
-
 void check_tools(const Plan& plan, const TurnedSlab& slab) {
     const double tallest = max_layer_of_longest(plan.job);
     if (tallest >= slab.slab_thickness) return;
@@ -58,13 +58,13 @@ void check_tools(const Plan& plan, const TurnedSlab& slab) {
 }
 
 Plan plan_underside(Context& context, const Plan& plan, MeshView pattern, const Layer& layer, double web,
-                    ProgressShare share) {
+                    ProgressShare share, const std::array<double, 2>& origin) {
     const TurnedSlab slab = turned_slab(plan, layer, web);
     check_tools(plan, slab);
     const Mesh target = underside_target(context, pattern, slab);
     Plan under;
     under.input = plan.input;
-    under.job = underside_job(plan.job, slab.slab_thickness);
+    under.job = underside_job(plan, slab.slab_thickness, origin);
     under.turned = slab;
     under.stock_max = {slab.blank.length(), slab.blank.width()};
     under.features = find_features(context, target.view(), feature_options(under.job)).features;
@@ -73,6 +73,8 @@ Plan plan_underside(Context& context, const Plan& plan, MeshView pattern, const 
     only.z_top = only.slab_thickness = slab.slab_thickness;
     only.reason = fmt::format("the underside of layer {}'s slab", layer.index);
     only.dowels = turned_dowels(slab, dowels_under(plan, layer));
+    place_keep_outs(under);
+    check_probed_place(under);
     const std::vector<std::vector<JointWood>> joints = wood_at_joints(context, target.view(), under);
     const std::vector<std::vector<StandingFoot>> feet = standing_feet(context, under, joints);
     cut_layers(context, under, target.view(), joints, feet, share, {});
@@ -84,6 +86,11 @@ Plan plan_underside(Context& context, const Plan& plan, MeshView pattern, const 
 
 }  // namespace
 
+TurnedSlab turned_slab(const Plan& plan, const Layer& layer, double web) {
+    return {layer.index, layer.z_bottom,          layer.z_top, layer.slab_thickness, slab_of(plan, layer),
+            web,         underside_room(plan.job)};
+}
+
 void check_two_sided(const Job& job, MeshView pattern) {
     const auto refuse = [](const char* what, const char* remedy) {
         throw refusal("layers.sides", fmt::format("slabs milled on both sides cannot yet go with {}", what),
@@ -92,8 +99,6 @@ void check_two_sided(const Job& job, MeshView pattern) {
     if (job.flask.enabled) refuse("a flask", "plan without flask");
     if (job.layers.strategy == LayerStrategy::combined)
         refuse("layers.strategy = \"combined\"", "take another strategy");
-    if (job.machine.probe != ProbeMode::none) refuse("probing programs", "take machine.probe = \"none\"");
-    if (!job.machine.keep_outs.empty()) refuse("keep-outs", "plan without keep-outs");
     for (const Index3& n : pattern.neighbours)
         if (std::find(n.begin(), n.end(), kNoFacet) != n.end())
             throw refusal("underside.open", "the pattern is open at its base, so it has no underside to mill",
@@ -207,14 +212,23 @@ std::string_view without_layer(std::string_view message) {
 }  // namespace
 
 void plan_undersides(Context& context, Plan& plan, MeshView pattern, const std::vector<MilledLayer>& milled,
-                     ProgressShare share) {
+                     ProgressShare share, const std::array<double, 2>& origin) {
     std::vector<std::size_t> turned;
     for (std::size_t i = 0; i < milled.size(); ++i)
         if (milled[i].milled == MilledFrom::both_sides) turned.push_back(i);
     for (std::size_t k = 0; k < turned.size(); ++k) {
         const double step = 1.0 / static_cast<double>(turned.size()), at = static_cast<double>(k) * step;
-        plan.undersides.push_back(plan_underside(context, plan, pattern, plan.layers[turned[k]],
-                                                 milled[turned[k]].web, {share.at(at), share.at(at + step)}));
+        const Layer& layer = plan.layers[turned[k]];
+        try {
+            plan.undersides.push_back(plan_underside(context, plan, pattern, layer, milled[turned[k]].web,
+                                                     {share.at(at), share.at(at + step)}, origin));
+        } catch (const Error& e) {
+            // Its place counts on the slab as it lies there.
+            if (!e.code().starts_with("keep_out.")) throw;
+            throw Error(e.kind(), e.code(),
+                        fmt::format("underside of layer {}: {}", layer.index, e.message()), e.place(),
+                        e.remedy());
+        }
         for (Diagnostic& told : plan.undersides.back().diagnostics) told.where.reset();
         for (const Diagnostic& told : plan.undersides.back().diagnostics)
             if (told.severity != Severity::note)
@@ -224,6 +238,40 @@ void plan_undersides(Context& context, Plan& plan, MeshView pattern, const std::
                      fmt::format("underside of layer {}: {}", plan.layers[turned[k]].index,
                                  without_layer(told.message)),
                      {}});
+    }
+}
+
+namespace {
+
+/// How hard a layer's cutters push along their axes at most, N.
+double push_of(const Layer& layer, const Job& job) {
+    double most = 0;
+    for (const Operation& op : layer.operations) {
+        const auto tool = std::find_if(job.tools.begin(), job.tools.end(),
+                                       [&](const Tool& t) { return t.number == op.tool; });
+        if (tool == job.tools.end() || !mills(tool->kind)) continue;
+        const CutSegment cut = heaviest_cut(op, *tool, job);
+        if (cut.high_mm > 0) most = std::max(most, std::min(op.peak_force_n, peak_force(cut).peak_axial_n));
+    }
+    return most;
+}
+
+}  // namespace
+
+void warn_of_floors(Context& context, Plan& plan, MeshView pattern, const AirGaps& gaps,
+                    const std::vector<MilledLayer>& milled) {
+    const auto is_turned = [](const MilledLayer& layer) { return layer.milled == MilledFrom::both_sides; };
+    if (std::none_of(milled.begin(), milled.end(), is_turned)) return;
+    const FloorMap floors(context, pattern, gaps);
+    const double strength = plan.job.material.strength_mpa;
+    for (std::size_t l = 0; l < milled.size(); ++l) {
+        if (!is_turned(milled[l])) continue;
+        FloorLoads loads{push_of(plan.layers[l], plan.job), 0};
+        if (l + 1 < plan.layers.size() && !plan.layers[l + 1].joints.empty())
+            loads.pressure_mpa = plan.layers[l + 1].joints.front().pressure_mpa;
+        const auto floor = floors.weakest(context, milled[l], plan.layers[l].z_bottom, loads);
+        if (floor && floor->stress_mpa() > strength)
+            plan.diagnostics.push_back(weak_floor(plan.layers[l].index, *floor, loads, strength));
     }
 }
 

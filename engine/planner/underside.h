@@ -33,16 +33,27 @@ void check_two_sided(const Job& job, MeshView pattern);
 [[nodiscard]] std::vector<MilledLayer> milled_layers(Context& context, const Plan& plan, MeshView pattern,
                                                      const AirGaps& gaps);
 
+/// A layer's slab as it is milled from below. @param web mm, MilledLayer::web
+[[nodiscard]] TurnedSlab turned_slab(const Plan& plan, const Layer& layer, double web);
+
 /// Says what stays filled, and refuses what the job does not accept.
 /// @param origin of the frame that places are told in
 /// @throws Error(no_plan, "undercut.unmade")
 void settle_unmade(Context& context, Plan& plan, const AirGaps& gaps, const std::vector<MilledLayer>& milled,
                    const std::array<double, 2>& origin);
 
+/// Says of each layer that is milled on both sides which floor over what is milled from below would break,
+/// under its cutters or the press of the next slab: "floor.weak".
+/// @param plan its layers' programs, their forces and joints. @throws as air_gaps()
+void warn_of_floors(Context& context, Plan& plan, MeshView pattern, const AirGaps& gaps,
+                    const std::vector<MilledLayer>& milled);
+
 /// Fills Plan::undersides.
 /// @param plan its layers, blanks and dowels; their joints
-/// @param pattern with neighbours. @throws as make_plan(), and underside_target()
+/// @param pattern with neighbours
+/// @param origin of the frame that the table's keep-outs count in
+/// @throws as make_plan(), and underside_target()
 void plan_undersides(Context& context, Plan& plan, MeshView pattern, const std::vector<MilledLayer>& milled,
-                     ProgressShare share);
+                     ProgressShare share, const std::array<double, 2>& origin);
 
 }  // namespace slabwright

@@ -268,6 +268,22 @@ std::vector<KeepOutZone> keep_outs_in(const Plan& plan, const Layer& layer, cons
     return zones;
 }
 
+std::vector<KeepOut> moved(std::vector<KeepOut> keep_outs, const std::array<double, 2>& by) {
+    for (KeepOut& keep_out : keep_outs) {
+        for (std::size_t k = 0; k < keep_out.rectangle.size(); ++k) keep_out.rectangle[k] += by[k % 2];
+        for (Place& corner : keep_out.polygon)
+            for (std::size_t k = 0; k < 2; ++k) corner[k] += by[k];
+        for (std::size_t k = 0; k < std::min<std::size_t>(2, keep_out.circle.size()); ++k)
+            keep_out.circle[k] += by[k];
+    }
+    return keep_outs;
+}
+
+std::vector<KeepOut> keep_outs_below(const Plan& plan, const Place& origin) {
+    const Place shift = shift_of(plan, origin);
+    return moved(plan.job.machine.keep_outs, {shift[0] - plan.stock_min[0], shift[1] - plan.stock_min[1]});
+}
+
 void place_keep_outs(Plan& plan, const Place& origin) {
     const Place shift = shift_of(plan, origin);
     for (const KeepOut& keep_out : plan.job.machine.keep_outs) {
@@ -292,7 +308,7 @@ void place_keep_outs(Plan& plan, const Place& origin) {
                     "way");
         }
         if (keep_out.from == KeepOutBase::board || without.empty()) continue;
-        if (carrying == 0)
+        if (carrying == 0 && !plan.turned)
             throw refusal(
                 "keep_out.slab",
                 fmt::format("\"{}\" counts from the slab, but stands on no layer's slab", keep_out.name),

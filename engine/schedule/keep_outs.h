@@ -36,8 +36,17 @@ struct KeepOutZone {
 /// Holds the keep-outs against the layers' slabs, before any path is made: adds a warning "keep_out.slab" for
 /// each keep-out on the slab that some layers' slabs do not carry.
 /// @throws Error(no_plan, "keep_out.entered") where a slab would lie on what stands on the base board;
-/// Error(no_plan, "keep_out.slab") where no layer's slab carries a keep-out that stands on one
+/// Error(no_plan, "keep_out.slab") where no layer's slab carries a keep-out that stands on one; of a slab
+/// that is milled from below that is only warned of
 void place_keep_outs(Plan& plan, const std::array<double, 2>& origin = {});
+
+/// Keep-outs farther along x and y, mm.
+[[nodiscard]] std::vector<KeepOut> moved(std::vector<KeepOut> keep_outs, const std::array<double, 2>& by);
+
+/// The plan's keep-outs as the programs of its slabs' undersides count: these slabs lie with their left front
+/// corner on the board's. @param origin that the plan's x and y count from, mm
+[[nodiscard]] std::vector<KeepOut> keep_outs_below(const Plan& plan,
+                                                   const std::array<double, 2>& origin = {});
 
 /// Has an operation of a layer keep clear: its clearance height lies 1 mm over what rapids need to pass over
 /// every zone; rapids, and moves by feed beside or above the slab, that would enter a zone go up before it,

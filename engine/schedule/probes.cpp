@@ -118,7 +118,7 @@ int add_probe(Plan& plan, const Layer& layer, int tool, int files, std::vector<i
     probe.touches = probed_place(plan, layer);
     // "L003_02z_…" sorts behind the layer's second program and before its third; "L003-0_…" before
     // "L003.ngc".
-    const std::string stem = fmt::format("L{:03}", layer.index);
+    const std::string stem = fmt::format("{}{:03}", plan.turned ? 'B' : 'L', layer.index);
     probe.file = program_file(plan.job.machine, plan.job.machine.programs == ProgramSpan::layer
                                                     ? fmt::format("{}-0_probe_T{}", stem, tool)
                                                     : fmt::format("{}_{:02}{}_probe_T{}", stem, files,

@@ -16,6 +16,8 @@ namespace slabwright {
 
 namespace {
 
+constexpr int kTopNumbers = 50;  // of a layer's hundred; from there on its underside's
+
 /// Digits of a number, at least `least`.
 int width_of(std::size_t largest, int least) {
     return std::max(least, static_cast<int>(std::to_string(largest).size()));
@@ -87,11 +89,18 @@ std::vector<ProgramTools> tools_of_programs(const Plan& plan) {
 
 void name_programs(Plan& plan) {
     const Machine& machine = plan.job.machine;
-    std::size_t highest = 0, most = 0;
+    std::size_t highest = 0, most = 0, most_below = 0;
     for (const Layer& layer : plan.layers) {
         highest = std::max(highest, static_cast<std::size_t>(std::max(0, layer.index)));
         most = std::max(most, layer.operations.size());
     }
+    for (const Plan& under : plan.undersides)
+        for (const Layer& layer : under.layers) most_below = std::max(most_below, layer.operations.size());
+    // O0302 is layer 3's second and O0352 its underside's, where all numbers fit below those of what is faced
+    // off again; else they are counted through. One control may hold all of them.
+    const bool by_layer = highest < 80 && most < 100 && (most_below == 0 || most + most_below < 100);
+    const int first_below =
+        most <= kTopNumbers && most_below < 100 - kTopNumbers ? kTopNumbers : static_cast<int>(most);
     const int layer_width = width_of(highest, 3), file_width = width_of(most, 2);
     int running = 0;
     for (Layer& layer : plan.layers) {
@@ -104,12 +113,8 @@ void name_programs(Plan& plan) {
             if (machine.programs != ProgramSpan::layer) stem += fmt::format("_{:0{}}", files, file_width);
             if (machine.programs == ProgramSpan::operation) stem += fmt::format("_{}", name(first.kind));
             if (machine.programs != ProgramSpan::layer) stem += fmt::format("_T{}", first.tool);
-            // O0302 is layer 3's second, where all numbers fit below those of what is faced off again.
             ++running;
-            // Of its underside O0352, so that one control may hold both.
-            const int number = plan.turned                  ? 100 * (layer.index % 80) + 50 + files
-                               : highest < 80 && most < 100 ? 100 * layer.index + files
-                                                            : running;
+            const int number = by_layer ? 100 * layer.index + files : running;
             for (std::size_t i = begin; i < end; ++i) {
                 layer.operations[i].file = program_file(machine, stem);
                 if (end - begin > 1) layer.operations[i].file += fmt::format("#{}", i - begin + 1);
@@ -117,6 +122,17 @@ void name_programs(Plan& plan) {
             }
         }
     }
+    for (Plan& under : plan.undersides)
+        for (Layer& layer : under.layers) {
+            int files = 0;
+            for (std::size_t begin = 0, end = 0; begin < layer.operations.size(); begin = end) {
+                end = file_end(layer, begin);
+                ++files;
+                ++running;
+                const int number = by_layer ? 100 * layer.index + first_below + files : running;
+                for (std::size_t i = begin; i < end; ++i) layer.operations[i].number = number;
+            }
+        }
 }
 
 void say_tool(SequenceStep& change, int tool, const Machine& machine, int place) {

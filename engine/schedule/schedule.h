@@ -17,7 +17,8 @@ void say_touch_off(SequenceStep& touch, const Plan& plan, const Layer& layer, do
 /// Names every operation's program (program_file), with widths such that the names sort in the order of
 /// execution: "L003_02_rough_T2.ngc" of layer, order within it, kind and tool; where a program holds all that
 /// a tool does between two changes "L003_02_T2.ngc", where it holds a layer "L003.ngc" (machine.programs).
-/// Operations that share one are "L003.ngc#1", "L003.ngc#2" …, and have one number.
+/// Operations that share one are "L003.ngc#1", "L003.ngc#2" …, and have one number. The undersides' programs,
+/// which have their names, get numbers that none of the plan's own and of each other's have.
 void name_programs(Plan& plan);
 
 /// Names the programs and fills plan.sequence and plan.totals from the layers (part_volume_mm3 is left as it

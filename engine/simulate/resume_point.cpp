@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "engine/simulate/planned_build.h"
 
 namespace slabwright {
@@ -59,6 +61,28 @@ void say_touch_off(ResumePoint& point, const PlannedBuild& build, const BuildSta
                     with, mm(*point.touch_off_mm), mm(-origin), mm(*point.work_offset_mm)));
 }
 
+/// Before a build whose slabs are milled on both sides: which of them are done.
+void say_undersides(ResumePoint& point, const BuildPlan& plan, const BuildState& state) {
+    for (std::size_t u = 0; u < plan.undersides.size(); ++u) {
+        const UndersideToMill& under = plan.undersides[u];
+        if (state.slabs_turned[u]) continue;
+        point.checks.push_back(
+            state.undersides_milled[u]
+                ? fmt::format(
+                      "layer {}'s slab is milled from below and lies upside down; turn it over, left to "
+                      "right, and mark its front edge",
+                      under.layer)
+                : fmt::format("layer {}'s slab is to be milled from below; where that was begun, slabwright "
+                              "resume OUT/{} says how far",
+                              under.layer, under.folder));
+    }
+    const auto turned = static_cast<std::size_t>(std::count_if(
+        state.slabs_turned.begin(), state.slabs_turned.end(), [](const Cause& c) { return c; }));
+    if (turned > 0)
+        point.checks.push_back(
+            fmt::format("{} of {} slabs are milled from below and turned", turned, plan.undersides.size()));
+}
+
 /// Where the tools stand, and which of them is in the spindle.
 void say_magazine(ResumePoint& point) {
     std::string places;
@@ -106,7 +130,8 @@ ResumePoint resume_point(const BuildPlan& plan, const BuildSequence& sequence, c
         return point;
     }
     if (!state.board) {
-        point.checks.emplace_back("nothing is mounted yet; begin with step 1");
+        say_undersides(point, plan, state);
+        if (point.checks.empty()) point.checks.emplace_back("nothing is mounted yet; begin with step 1");
         return point;
     }
     point.checks.emplace_back(state.in_hand ? "the clamps hold the base board, and the handler its slab"

@@ -50,6 +50,7 @@ void visit_state(State& s, Visitor& visit) {
     visit.cause("last_cut", s.last_cut);
     visit.cause("unloaded", s.unloaded);
     visit.cause("mould_box", s.boxed);
+    visit.cause_if_any("dowels_set", s.dowels);
 }
 
 class StateWriter {
@@ -70,6 +71,9 @@ public:
         json_.key(key);
         if (value) json_.integer(sequence_.steps[*value].id);
         else json_.null();
+    }
+    void cause_if_any(const char* key, const Cause& value) {
+        if (value) cause(key, value);
     }
 
 private:
@@ -149,6 +153,10 @@ public:
         const Json& from = text_.at(state_, key);
         if (!from.is_null()) value = place(from, key);
     }
+    /// Of a key that may be missing.
+    void cause_if_any(const char* key, Cause& value) {
+        if (state_.contains(key)) cause(key, value);
+    }
     [[nodiscard]] std::size_t place(const Json& id, const char* key) const {
         const auto found = place_of_.find(static_cast<int>(text_.whole(id, key)));
         if (found == place_of_.end()) text_.refuse(fmt::format("{} names a step that does not exist", key));
@@ -179,6 +187,22 @@ public:
             const auto found = causes.find(file);
             if (found == causes.end()) text_.refuse(fmt::format("{} is no program of this build", file));
             *found->second = place(id, "programs");
+        }
+    }
+
+    /// Of each underside the step that milled it, and the one that turned its slab, 0 for none.
+    void undersides(const BuildPlan& plan, BuildState& state) const {
+        if (plan.undersides.empty()) return;
+        const Json& told = text_.at(state_, "undersides");
+        if (!told.is_object() || told.size() != plan.undersides.size())
+            text_.refuse("undersides are not those of this build");
+        for (std::size_t u = 0; u < plan.undersides.size(); ++u) {
+            const Json& steps = text_.at(told, plan.undersides[u].folder.c_str());
+            if (!steps.is_array() || steps.size() != 2) text_.refuse("undersides has one that is no pair");
+            if (text_.whole(steps[0], "undersides") != 0)
+                state.undersides_milled[u] = place(steps[0], "undersides");
+            if (text_.whole(steps[1], "undersides") != 0)
+                state.slabs_turned[u] = place(steps[1], "undersides");
         }
     }
 
@@ -241,6 +265,19 @@ std::string progress_json(const BuildProgress& progress, const BuildPlan& plan,
         }
         json.end();
     }
+    if (!plan.undersides.empty()) {
+        const auto id = [&](const std::vector<Cause>& causes, std::size_t u) {
+            return u < causes.size() && causes[u] ? sequence.steps[*causes[u]].id : 0;
+        };
+        json.key("undersides").begin_object();
+        for (std::size_t u = 0; u < plan.undersides.size(); ++u)
+            json.key(plan.undersides[u].folder)
+                .begin_array(JsonText::Shape::line)
+                .integer(id(progress.state.undersides_milled, u))
+                .integer(id(progress.state.slabs_turned, u))
+                .end();
+        json.end();
+    }
     json.key("programs").begin_object();
     const auto put = [&](const std::vector<PlannedProgram>& programs, const std::vector<Cause>& ran) {
         for (std::size_t p = 0; p < ran.size(); ++p)
@@ -273,9 +310,12 @@ BuildState parse_progress_state(std::string_view text, const BuildPlan& plan, co
     state.done = static_cast<std::size_t>(from.whole(from.at(from.document(), "after"), "after"));
     state.ran_in.resize(plan.programs.size());
     state.faced_off.resize(plan.face_offs.size());
+    state.undersides_milled.resize(plan.undersides.size());
+    state.slabs_turned.resize(plan.undersides.size());
     StateReader reader(from, sequence);
     visit_state(state, reader);
     if (plan.job_stated) reader.magazine(static_cast<std::size_t>(plan.job.machine.magazine), state);
+    reader.undersides(plan, state);
     reader.programs(plan, state);
     return state;
 }

@@ -87,17 +87,21 @@ PackedFilling packed_filling(Context& context, MeshView mesh, std::span<const Si
     auto rows =
         filled_gaps(context, mesh, borders,
                     {first[0], first[1], cell, static_cast<std::size_t>(ny), static_cast<std::size_t>(nx)});
-    for (auto& row : rows)
-        std::erase_if(row, [&](const FilledGap& gap) {
-            return both_sides[gap.layer] && gap.low <= borders[gap.layer] + StandingPart::kSheet;
+    std::vector<std::vector<FilledGap>> milled(rows.size());
+    for (std::size_t r = 0; r < rows.size(); ++r)
+        std::erase_if(rows[r], [&](const FilledGap& gap) {
+            const bool below = both_sides[gap.layer] && gap.low <= borders[gap.layer] + StandingPart::kSheet;
+            if (below) milled[r].push_back(gap);
+            return below;
         });
     double tolerance = kFirstTolerance;
-    std::vector<std::vector<FilledBox>> boxes(layers.size());
+    std::vector<std::vector<FilledBox>> boxes(layers.size()), below(layers.size());
     for (;; tolerance *= 2) {
         std::size_t count = 0;
         for (std::uint32_t l = 0; l < layers.size(); ++l) {
             boxes[l] = boxes_of(rows, l, tolerance);
-            count += boxes[l].size();
+            below[l] = boxes_of(milled, l, tolerance);
+            count += boxes[l].size() + below[l].size();
         }
         if (count <= kMostBoxes || tolerance > height) break;
     }
@@ -110,13 +114,16 @@ PackedFilling packed_filling(Context& context, MeshView mesh, std::span<const Si
         for (const auto& row : rows)
             for (const FilledGap& gap : row)
                 if (gap.layer == l) volume += (gap.high - gap.low) * cell * cell;
-        std::string bytes;
-        for (const FilledBox& b : boxes[l])
-            for (const std::uint16_t value :
-                 {static_cast<std::uint16_t>(b.row), static_cast<std::uint16_t>(b.column),
-                  static_cast<std::uint16_t>(b.count), share(b.low), share(b.high)})
-                append(bytes, value);
-        list.push_back({base64(bytes), std::round(volume)});
+        const auto packed = [&](const std::vector<FilledBox>& list_of) {
+            std::string bytes;
+            for (const FilledBox& b : list_of)
+                for (const std::uint16_t value :
+                     {static_cast<std::uint16_t>(b.row), static_cast<std::uint16_t>(b.column),
+                      static_cast<std::uint16_t>(b.count), share(b.low), share(b.high)})
+                    append(bytes, value);
+            return base64(bytes);
+        };
+        list.push_back({packed(boxes[l]), std::round(volume), packed(below[l])});
     }
     return {z0, height, tolerance, std::move(list)};
 }

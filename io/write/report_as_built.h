@@ -32,6 +32,7 @@ struct PackedFilling {
     struct Layer {
         std::string boxes;  ///< base64
         double mm3 = 0;
+        std::string below;  ///< base64 of boxes likewise: what is milled from below
     };
     double z0 = 0, height = 0, tolerance = 0;  ///< mm
     std::vector<Layer> layers;

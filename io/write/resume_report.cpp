@@ -21,7 +21,7 @@ std::string mm(double value) { return rounded_text(value, 3); }
 std::string told(const SequenceStep& step) {
     std::string text = fmt::format("step {}, layer {}: {}", step.id, step.layer, step.action);
     for (const auto& [key, value] : step.words)
-        if (key == "program") text += " " + value;
+        if (key == "program" || key == "sequence") text += " " + value;
     for (const auto& [key, value] : step.numbers) {
         if ((step.action == "tool_change" || step.action == "load_tool") && key == "tool")
             text += fmt::format(" T{:.0f}", value);

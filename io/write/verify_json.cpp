@@ -61,7 +61,16 @@ void put_undersides(JsonText& text, const std::vector<UndersideFindings>& unders
         text.key("removed_mm3").rounded(r.removed_mm3, 0);
         text.key("cutting_mm").rounded(r.cutting_mm, 1);
         text.key("rapid_mm").rounded(r.rapid_mm, 1);
-        text.key("minutes").rounded(r.seconds / 60, 2).end();
+        text.key("minutes").rounded(r.seconds / 60, 2);
+        if (under.floor) {
+            const LoadedFloor& floor = *under.floor;
+            text.key("floor").begin_object(JsonText::Shape::line);
+            text.key("thickness").rounded(floor.thickness_mm, 2).key("reach").rounded(floor.reach_mm, 2);
+            text.key("press_mpa").rounded(floor.press_mpa, 2).key("where");
+            put_point(text, floor.at);
+            text.end();
+        }
+        text.end();
     }
     text.end();
 }

@@ -8,7 +8,7 @@ import {keepOutsIn} from './drawing.js';
 import {pathOf} from './paths.js';
 import {data, featureKinds, flaskRings, featureRange, layerName, operationName, operations, plan, toolOf} from './report.js';
 import {Run, StockField} from './stock.js';
-import {filledBoxes, woodHeights, woodTop} from './wood.js';
+import {filledBoxes, woodFloors, woodHeights, woodTop} from './wood.js';
 
 const layerColors = ['#b9c7cc', '#d9c49a'], cutColor = '#c98f4a', woodColors = ['#d3b27c', '#dfc190'], filledColor = '#d3202f', glueColor = '#eab431';
 const surfaces = [
@@ -463,7 +463,7 @@ class View {
         const list = entries => make('ul', {class: 'legend'}, entries.map(e => make('li', {}, make('i', {style: `background:${e.color}`}), e.name)));
         const bar = (ramp, from, to) => [make('div', {class: 'ramp', style: `background:linear-gradient(90deg,${ramp.join(',')})`}), make('div', {}, make('span', {}, from), make('span', {}, to))];
         const content = {
-            wood: () => [list([{name: 'wood as cut', color: woodColors[0]}]), make('p', {class: 'note'}, `After all programs, from a stock with ${figure(data.stock.cell_mm, 2)} mm between its points; under overhangs it stands where air should be.`)],
+            wood: () => [list([{name: 'wood as cut', color: woodColors[0]}]), make('p', {class: 'note'}, `After all programs, from a stock with ${figure(data.stock.cell_mm, 2)} mm between its points; under overhangs it stands where air should be.${data.undersides ? ' What is milled from below is taken out as the slabs’ undersides are planned.' : ''}`)],
             layers: () => list([{name: 'odd layers', color: layerColors[0]}, {name: 'even layers', color: layerColors[1]}, {name: 'cut face', color: cutColor}]),
             surfaces: () => list(surfaces),
             slope: () => [bar(slopeRamp, '0° flat', '90° upright'), list([{name: 'faces down', color: '#8b8b8b'}])],
@@ -531,7 +531,7 @@ class View {
         this.readout = make('output', {id: 'readout'});
         this.panel.append(
             make('fieldset', {}, make('legend', {}, 'Look'), make('div', {class: 'row'},
-                button('Fit', () => this.fit()), button('Top', () => this.look(0, -1e-4, 1)), button('Front', () => this.look(0, -1, 0)), button('Side', () => this.look(1, 0, 0)),
+                button('Fit', () => this.fit()), button('Top', () => this.look(0, -1e-4, 1)), button('Front', () => this.look(0, -1, 0)), button('Side', () => this.look(1, 0, 0)), button('Below', () => this.look(0, -1e-4, -1)),
                 button('+', () => this.zoom(0.8), {'aria-label': 'Nearer'}), button('−', () => this.zoom(1.25), {'aria-label': 'Farther'}))),
             make('fieldset', {}, make('legend', {}, 'Layers'), explode, axis, section, this.sectionReadout),
             make('fieldset', {}, make('legend', {}, 'Show'), shape, mode, patternTick, filledTick, glueTick, boundaryTick, featureTick, this.keepOuts.length ? keepTick : null, this.legendBox),
@@ -539,7 +539,7 @@ class View {
                 make('p', {class: 'note'}, `The stock has ${figure(data.stock.cell_mm, 2)} mm between its points; ways are drawn within ${figure(data.paths.tolerance_mm, 3)} mm, time by feed.`)),
             make('details', {}, make('summary', {}, 'Keys and mouse'), make('p', {class: 'note'},
                 'Drag turns, right drag or two fingers move, wheel or pinch zooms, a double click tells what is there. With the view focused: ', make('kbd', {}, '← → ↑ ↓'), ' turn, with ', make('kbd', {}, 'Shift'), ' move, ',
-                make('kbd', {}, '+'), ' ', make('kbd', {}, '−'), ' zoom, ', make('kbd', {}, '1'), ' ', make('kbd', {}, '2'), ' ', make('kbd', {}, '3'), ' top, front, side, ', make('kbd', {}, 'Home'), ' all, ', make('kbd', {}, 'Space'), ' plays.')));
+                make('kbd', {}, '+'), ' ', make('kbd', {}, '−'), ' zoom, ', make('kbd', {}, '1'), ' ', make('kbd', {}, '2'), ' ', make('kbd', {}, '3'), ' ', make('kbd', {}, '4'), ' top, front, side, below, ', make('kbd', {}, 'Home'), ' all, ', make('kbd', {}, 'Space'), ' plays.')));
     }
 
     toggle() { this.state.play ? this.stop() : this.start(); }
@@ -596,6 +596,7 @@ class View {
         else if (event.key === '1') this.look(0, -1e-4, 1);
         else if (event.key === '2') this.look(0, -1, 0);
         else if (event.key === '3') this.look(1, 0, 0);
+        else if (event.key === '4') this.look(0, -1e-4, -1);
         else if (event.key === ' ' && this.run) this.toggle();
         else return;
         event.preventDefault();
@@ -804,43 +805,51 @@ function plates(heights, nx) {
     return count;
 }
 
-// The wood of layer l: its upper side, walls where it ends, and its underside. Cells with nothing are left out.
+// The wood of layer l: its upper side, walls where it ends, and its underside, with what is milled from below taken out. Cells with nothing are left out.
 function woodGeometry(l) {
-    const {nx, ny, x0, y0, cell_mm: cell} = data.stock, bottom = plan.layers[l].z_bottom;
+    const {nx, ny, x0, y0, cell_mm: cell} = data.stock, floors = woodFloors(l);
     // A relief has another height in every cell: then heights a little apart are one.
     let heights = woodHeights(l);
     for (let step = 2; step <= 8 && plates(heights, nx) > mostPlates; step *= 2) heights = heights.map(h => h === 0 || h === 255 ? h : Math.min(254, Math.max(1, Math.round(h / step) * step)));
-    const position = [], at = (i, j) => i >= 0 && j >= 0 && i < nx && j < ny ? heights[j * nx + i] : 0;
+    // A cell's wood from its floor to its height in one number; 0 where nothing stands.
+    const wood = c => { const h = heights[c], f = floors ? floors[c] : 0; return h > f ? f * 256 + h : 0; };
+    const position = [], at = (i, j) => i >= 0 && j >= 0 && i < nx && j < ny ? wood(j * nx + i) : 0;
+    const floorOf = a => a >> 8, heightOf = a => a & 255, z = byte => woodTop(l, byte);
     const quad = (a, b, c, d) => position.push(...a, ...b, ...c, ...a, ...c, ...d);
+    // What of a's side shows beside b.
+    const exposed = (a, b, put) => {
+        if (a === 0 || a === b) return;
+        const f = floorOf(a), h = heightOf(a);
+        if (b === 0) { put(z(f), z(h)); return; }
+        if (floorOf(b) > f) put(z(f), z(Math.min(h, floorOf(b))));
+        if (heightOf(b) < h) put(z(Math.max(f, heightOf(b))), z(h));
+    };
     const half = cell / 2;
-    // Neighbours in a row that are equally high are one plate.
+    // Neighbours in a row that are alike are one plate.
     for (let j = 0; j < ny; ++j)
         for (let i = 0; i < nx;) {
-            const h = at(i, j);
+            const a = at(i, j);
             let end = i + 1;
-            while (end < nx && at(end, j) === h) ++end;
-            if (h > 0) {
-                const z = woodTop(l, h), xa = x0 + i * cell - half, xb = x0 + (end - 1) * cell + half, ya = y0 + j * cell - half, yb = ya + cell;
-                quad([xa, ya, z], [xb, ya, z], [xb, yb, z], [xa, yb, z]);
+            while (end < nx && at(end, j) === a) ++end;
+            if (a > 0) {
+                const top = z(heightOf(a)), bottom = z(floorOf(a)), xa = x0 + i * cell - half, xb = x0 + (end - 1) * cell + half, ya = y0 + j * cell - half, yb = ya + cell;
+                quad([xa, ya, top], [xb, ya, top], [xb, yb, top], [xa, yb, top]);
                 quad([xa, ya, bottom], [xa, yb, bottom], [xb, yb, bottom], [xb, ya, bottom]);
-                const low = other => other > 0 ? woodTop(l, other) : bottom;
-                if (at(i - 1, j) < h) quad([xa, yb, z], [xa, yb, low(at(i - 1, j))], [xa, ya, low(at(i - 1, j))], [xa, ya, z]);
-                if (at(end, j) < h) quad([xb, ya, z], [xb, ya, low(at(end, j))], [xb, yb, low(at(end, j))], [xb, yb, z]);
+                exposed(a, at(i - 1, j), (low, high) => quad([xa, yb, high], [xa, yb, low], [xa, ya, low], [xa, ya, high]));
+                exposed(a, at(end, j), (low, high) => quad([xb, ya, high], [xb, ya, low], [xb, yb, low], [xb, yb, high]));
             }
             i = end;
         }
-    // Walls to the rows before and behind, joined while both heights stay the same.
+    // Walls to the rows before and behind, joined while both stay the same.
     for (let j = 0; j <= ny; ++j) {
         const y = y0 + j * cell - half;
         for (let i = 0; i < nx;) {
             const a = at(i, j - 1), b = at(i, j);
             let end = i + 1;
             while (end < nx && at(end, j - 1) === a && at(end, j) === b) ++end;
-            if (a !== b) {
-                const xa = x0 + i * cell - half, xb = x0 + (end - 1) * cell + half, top = woodTop(l, Math.max(a, b)), foot = Math.min(a, b) > 0 ? woodTop(l, Math.min(a, b)) : bottom;
-                if (b > a) quad([xa, y, foot], [xb, y, foot], [xb, y, top], [xa, y, top]);
-                else quad([xb, y, foot], [xa, y, foot], [xa, y, top], [xb, y, top]);
-            }
+            const xa = x0 + i * cell - half, xb = x0 + (end - 1) * cell + half;
+            exposed(b, a, (low, high) => quad([xa, y, low], [xb, y, low], [xb, y, high], [xa, y, high]));
+            exposed(a, b, (low, high) => quad([xb, y, low], [xa, y, low], [xa, y, high], [xb, y, high]));
             i = end;
         }
     }
