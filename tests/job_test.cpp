@@ -101,6 +101,7 @@ TEST(Job, EveryKeyRoundTrips) {
     for (Tool& tool : job.tools) tool.corner_radius = tool.taper_deg = 0;  // not every kind has them
     for (Tool& tool : job.tools)
         if (tool.kind != ToolKind::drill) tool.point_deg = Tool{}.point_deg;
+    for (Tool& tool : job.tools) tool.holder_profile[1] = tool.holder_diameter;  // the nose, told twice
     job.tools[1].kind = ToolKind::bull_nose;
     job.tools[1].corner_radius = scramble.real(0.5, 2);
     job.tools[2].kind = ToolKind::tapered_ball;

@@ -122,13 +122,15 @@ std::vector<TipOffset> point_offsets(const SharpEdge& edge) {
 
 class EdgePaths {
 public:
-    EdgePaths(const LayerCut& cut, LayerStock& stock)
-        : cut_(cut), stock_(stock), limit_(2 * cut.job.tolerances.gouge) {}
+    /// @param points by cones; else by all other tools
+    EdgePaths(const LayerCut& cut, LayerStock& stock, bool points)
+        : cut_(cut), stock_(stock), points_(points), limit_(2 * cut.job.tolerances.gouge) {}
 
     std::vector<Operation> run() {
+        list_tools();
+        if (tools_.empty()) return {};
         const std::vector<SharpEdge> edges = edges_in(cut_);
         if (edges.empty()) return {};
-        list_tools();
         std::vector<std::vector<EdgePlaces>> places(edges.size());
         parallel_each(cut_.context, edges.size(), [&](std::size_t e) { places[e] = places_along(edges[e]); });
         std::vector<Operation> operations;
@@ -141,11 +143,14 @@ private:
     // The finish tool is preferred; then smaller ones, then the flats.
     void list_tools() {
         const LayerTools& tools = cut_.layer.tools;
+        if (points_) {
+            for (const Tool& tool : cut_.job.tools)
+                if (tool.kind == ToolKind::cone) add(tool);
+            return;
+        }
         add(tools.finish);
         for (const Tool& tool : tools.rest) add(tool);
         add(tools.rough);
-        for (const Tool& tool : cut_.job.tools)
-            if (tool.kind == ToolKind::cone) add(tool);
         double finest = kAlong * kUnitsPerMm;
         for (const EdgeTool& t : tools_)
             if (!t.ends_in_point())
@@ -229,13 +234,19 @@ private:
         return best;
     }
 
+    // How deep under the layer's top it may go, mm: a shank no wider than the cutter may follow it.
+    [[nodiscard]] double depth_of(const Tool& tool) const {
+        if (tool.shank_diameter > tool.diameter) return max_layer_of(cut_.job, tool);
+        return tool.stickout - cut_.job.cutting.holder_clearance;
+    }
+
     // The tip where it touches the edge; none where something keeps it away from there.
     [[nodiscard]] std::optional<Vec3d> tip_at(const EdgeTool& t, const Vec3d& wanted, MetPoints& met) const {
         const LayerJob& layer = cut_.layer;
         const double x = to_mm(to_units(wanted[0])), y = to_mm(to_units(wanted[1]));
         const double lowest =
             std::max(t.ball ? layer.floor_below : std::max(layer.floor_below, layer.z_bottom),
-                     layer.z_top - max_layer_of(cut_.job, *t.tool));
+                     layer.z_top - depth_of(*t.tool));
         if (x < cut_.low(0, t.radius) || x > cut_.high(0, t.radius) || y < cut_.low(1, t.radius) ||
             y > cut_.high(1, t.radius))
             return std::nullopt;
@@ -307,6 +318,7 @@ private:
 
     const LayerCut& cut_;
     LayerStock& stock_;
+    bool points_;
     double limit_, along_ = kAlong;  // mm
     std::vector<EdgeTool> tools_;
 };
@@ -314,7 +326,10 @@ private:
 }  // namespace
 
 std::vector<Operation> follow_edges(const LayerCut& cut, LayerStock& stock) {
-    return EdgePaths(cut, stock).run();
+    // What balls leave in a hollow is for points.
+    std::vector<Operation> operations = EdgePaths(cut, stock, false).run();
+    for (Operation& op : EdgePaths(cut, stock, true).run()) operations.push_back(std::move(op));
+    return operations;
 }
 
 }  // namespace slabwright
