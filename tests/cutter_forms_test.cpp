@@ -20,6 +20,7 @@
 #include "nlohmann/json.hpp"
 #include "tests/mesh_shapes.h"
 #include "tests/support/files.h"
+#include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -213,13 +214,18 @@ TEST(CutterForms, PlansWithALibraryOfEveryFormAreProven) {
     job.tools = forms_library();
     job.selection.mode = SelectionMode::fixed;
     job.cutting.edges = true;
+    job.tools[2].holder_profile = {20, 32, 32, 20, 32, 60};
     write(context, plan(context, stl, job), out);
+    EXPECT_EQ(
+        support::schema_complaint(slurp(out + "/plan.json"), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
+        "");
     const VerifyResult result = verify(context, out, stl, {}, 1);
     for (const Diagnostic& d : result.violations) ADD_FAILURE() << d.code << ' ' << d.message;
     const json planned = json::parse(slurp(out + "/plan.json"));
     EXPECT_EQ(planned["tools"][5]["kind"], "tapered-ball");
     EXPECT_EQ(planned["tools"][5]["taper_deg"], 5.0);
     EXPECT_EQ(planned["tools"][6]["point_deg"], 90.0);
+    EXPECT_EQ(planned["tools"][2]["holder"]["profile"].size(), 6U);
     std::map<int, int> operations;
     for (const json& layer : planned["layers"])
         for (const json& op : layer["operations"]) {
