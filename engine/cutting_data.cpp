@@ -85,6 +85,10 @@ bool is_in(CuttingScope scope, ToolKind kind) {
             return kind == ToolKind::drill;
         case CuttingScope::bull_nose:
             return kind == ToolKind::bull_nose;
+        case CuttingScope::tapered_ball:
+            return kind == ToolKind::tapered_ball;
+        case CuttingScope::cone:
+            return kind == ToolKind::cone;
     }
     return false;
 }

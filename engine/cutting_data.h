@@ -8,10 +8,20 @@
 
 namespace slabwright {
 
-enum class ToolKind : std::uint8_t { flat, ball, face, drill, bull_nose };
+enum class ToolKind : std::uint8_t { flat, ball, face, drill, bull_nose, tapered_ball, cone };
 
 /// Which tools a line of cutting data is for.
-enum class CuttingScope : std::uint8_t { any, end_mill, flat, ball, face, drill, bull_nose };
+enum class CuttingScope : std::uint8_t {
+    any,
+    end_mill,
+    flat,
+    ball,
+    face,
+    drill,
+    bull_nose,
+    tapered_ball,
+    cone
+};
 
 /// Published charts that the house knows by name. Nobody publishes one for tooling boards that could be read
 /// and cited, so there is none.

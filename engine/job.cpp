@@ -15,7 +15,7 @@ double max_layer_of(const Job& job, const Tool& tool) {
     // To touch a wall of slope a at the layer's bottom, a ball's tip passes it by R(1 - cos a); walls steeper
     // than the vertical limit go to the flat end mill, which stops at the bottom.
     const double steepest = job.cutting.vertical_deg * std::numbers::pi / 180;
-    const double overrun = tool.kind == ToolKind::ball ? tool.diameter / 2 * (1 - std::cos(steepest)) : 0.0;
+    const double overrun = has_ball_tip(tool.kind) ? tip_diameter(tool) / 2 * (1 - std::cos(steepest)) : 0.0;
     return tool.flute_length - overrun - job.cutting.holder_clearance;
 }
 
@@ -146,6 +146,8 @@ bool plunges_by_default(ToolKind kind) {
     switch (kind) {
         case ToolKind::ball:
         case ToolKind::drill:
+        case ToolKind::tapered_ball:
+        case ToolKind::cone:
             return true;
         case ToolKind::flat:
         case ToolKind::face:
@@ -165,10 +167,100 @@ CutterShape cutter_shape(const Tool& tool) {
             return {radius, radius, 0};
         case ToolKind::bull_nose:
             return {radius, tool.corner_radius, 0};
+        case ToolKind::tapered_ball:
+            return {radius, tool.corner_radius, tool.taper_deg * std::numbers::pi / 180};
         case ToolKind::drill:
-            return {radius, 0, 59 * std::numbers::pi / 180};
+        case ToolKind::cone:
+            return {radius, 0, tool.point_deg / 2 * std::numbers::pi / 180};
     }
     return {radius, 0, 0};
+}
+
+bool has_flank_and_holder(const Tool& tool) {
+    if (has_taper(tool.kind) && !(tool.taper_deg > 0 && tool.taper_deg < 90)) return false;
+    if (has_point(tool.kind) && !(tool.point_deg > 0 && tool.point_deg < 180)) return false;
+    return tool.holder_profile.size() % 3 == 0 &&
+           std::all_of(tool.holder_profile.begin(), tool.holder_profile.end(),
+                       [](double mm) { return mm > 0; });
+}
+
+std::vector<ToolSection> sections_of(const Tool& tool) {
+    std::vector<ToolSection> sections;
+    const double cutter = tool.diameter / 2;
+    const auto add = [&](const char* name, double above, double lower, double upper, double height) {
+        if (above <= 0 || std::max(lower, upper) <= cutter) return;
+        // A frustum begins where it is as wide as the cutter.
+        if (lower < cutter && upper > lower) {
+            const double share = (cutter - lower) / (upper - lower);
+            above += share * height, height *= 1 - share, lower = cutter;
+        }
+        sections.push_back({name, above, lower, std::max(lower, upper), upper > lower ? height : 0});
+    };
+    const double shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
+    add("shank", tool.flute_length, shank, shank, 0);
+    const std::span<const double> profile = tool.holder_profile;
+    if (profile.empty()) add("holder", tool.stickout, nose, nose, 0);
+    double above = tool.stickout;
+    for (std::size_t k = 0; k + 2 < profile.size(); k += 3) {
+        add("holder", above, profile[k + 1] / 2, profile[k + 2] / 2, profile[k]);
+        above += profile[k];
+    }
+    return sections;
+}
+
+std::vector<ToolSection> cylinders_of(const Tool& tool) {
+    constexpr double kStep = 0.5;  // mm
+    std::vector<ToolSection> cylinders;
+    for (const ToolSection& s : sections_of(tool)) {
+        const int steps = s.height > 0 ? static_cast<int>(std::ceil((s.radius - s.lower) / kStep)) : 1;
+        for (int k = 0; k < steps; ++k) {
+            const double wide = k + 1 == steps ? s.radius : s.lower + (s.radius - s.lower) * (k + 1) / steps;
+            cylinders.push_back({s.name, s.above + s.height * k / steps, wide, wide, 0});
+        }
+    }
+    return cylinders;
+}
+
+double tip_diameter(const Tool& tool) {
+    if (tool.kind == ToolKind::cone) return 0;
+    return tool.kind == ToolKind::tapered_ball ? 2 * tool.corner_radius : tool.diameter;
+}
+
+namespace {
+
+// Calls fn(z, diameter, dz) for thin slices of a cutter with a taper from where it is loaded up to its
+// holder; z over the load.
+template <class Fn>
+void each_slice(const Tool& tool, Fn&& fn) {
+    constexpr int kSlices = 200;
+    const CutterShape shape = cutter_shape(tool);
+    const double load = std::min(tool.stickout / 2, std::max(shape.corner, tool.stepdown_max / 2));
+    const double from = shape.corner * (1 - std::sin(shape.taper_rad)), tangent = std::tan(shape.taper_rad);
+    const double dz = (tool.stickout - load) / kSlices;
+    for (int k = 0; k < kSlices; ++k) {
+        const double z = load + (k + 0.5) * dz,
+                     radius = shape.corner * std::cos(shape.taper_rad) + std::max(0.0, z - from) * tangent,
+                     widest = z > tool.flute_length ? std::max(tool.shank_diameter, tool.diameter) / 2
+                                                    : tool.diameter / 2;
+        fn(z - load, 2 * std::min(radius, widest), dz);
+    }
+}
+
+}  // namespace
+
+double bending_diameter(const Tool& tool) {
+    if (!has_taper(tool.kind) && tool.kind != ToolKind::cone) return tool.diameter;
+    double sum = 0;
+    each_slice(tool, [&](double z, double d, double dz) { sum += z * z / (d * d * d * d) * dz; });
+    const double length = tool.stickout;
+    return std::pow(length * length * length / (3 * sum), 0.25);
+}
+
+double strength_diameter(const Tool& tool) {
+    if (!has_taper(tool.kind) && tool.kind != ToolKind::cone) return tool.diameter;
+    double most = 0;
+    each_slice(tool, [&](double z, double d, double) { most = std::max(most, z / (d * d * d)); });
+    return std::cbrt(tool.stickout / most);
 }
 
 bool is_end_mill(ToolKind kind) {
@@ -176,9 +268,11 @@ bool is_end_mill(ToolKind kind) {
         case ToolKind::flat:
         case ToolKind::ball:
         case ToolKind::bull_nose:
+        case ToolKind::tapered_ball:
             return true;
         case ToolKind::face:
         case ToolKind::drill:
+        case ToolKind::cone:
             break;
     }
     return false;
@@ -192,6 +286,8 @@ bool roughs_layers(ToolKind kind) {
         case ToolKind::ball:
         case ToolKind::face:
         case ToolKind::drill:
+        case ToolKind::tapered_ball:
+        case ToolKind::cone:
             break;
     }
     return false;
@@ -203,6 +299,8 @@ bool mills(ToolKind kind) {
         case ToolKind::ball:
         case ToolKind::face:
         case ToolKind::bull_nose:
+        case ToolKind::tapered_ball:
+        case ToolKind::cone:
             return true;
         case ToolKind::drill:
             break;
@@ -210,20 +308,14 @@ bool mills(ToolKind kind) {
     return false;
 }
 
-bool has_corner(ToolKind kind) {
-    switch (kind) {
-        case ToolKind::bull_nose:
-            return true;
-        case ToolKind::flat:
-        case ToolKind::ball:
-        case ToolKind::face:
-        case ToolKind::drill:
-            break;
-    }
-    return false;
-}
+bool has_corner(ToolKind kind) { return kind == ToolKind::bull_nose || kind == ToolKind::tapered_ball; }
+bool has_taper(ToolKind kind) { return kind == ToolKind::tapered_ball; }
+bool has_point(ToolKind kind) { return kind == ToolKind::drill || kind == ToolKind::cone; }
+bool has_ball_tip(ToolKind kind) { return kind == ToolKind::ball || kind == ToolKind::tapered_ball; }
 
-double clearing_radius(const Tool& tool) { return tool.diameter / 2 - tool.corner_radius; }
+double clearing_radius(const Tool& tool) {
+    return tool.diameter / 2 - (tool.kind == ToolKind::bull_nose ? tool.corner_radius : 0);
+}
 
 double core_diameter_of(const Tool& tool) {
     constexpr double kFlatShare = 0.3, kFaceShare = 0.8;
@@ -293,9 +385,11 @@ void state_feeds(Job& job) {
 }
 
 const Tool& tool_of_kind(const Job& job, ToolKind kind) {
-    static constexpr const char* words[] = {"flat end mill", "ball end mill", "face mill", "drill",
-                                            "bull-nose end mill"};
-    static constexpr const char* keys[] = {"flat", "ball", "face", "drill", "bull-nose"};
+    static constexpr const char* words[] = {"flat end mill", "ball end mill",      "face mill",
+                                            "drill",         "bull-nose end mill", "tapered ball end mill",
+                                            "cone"};
+    static constexpr const char* keys[] = {"flat",      "ball",         "face", "drill",
+                                           "bull-nose", "tapered-ball", "cone"};
     const auto found =
         std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& tool) { return tool.kind == kind; });
     if (found != job.tools.end()) return *found;

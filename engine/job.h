@@ -95,8 +95,24 @@ struct Tool {
     double strength_mpa = 0;  ///< the cutter's own in bending, as its maker states it; 0: not checked
     double core_diameter =
         -1;  ///< within which it has no edge: flat, face, bull-nose; negative: core_diameter_of()
-    double ramp_deg = -1;      ///< steepest way down into stock; negative: ramp_limit_deg()
-    double corner_radius = 0;  ///< of a bull-nose, between its floor and its side
+    double ramp_deg = -1;  ///< steepest way down into stock; negative: ramp_limit_deg()
+    double corner_radius =
+        0;                   ///< of a bull-nose, between its floor and its side; of a tapered ball, its tip's
+    double taper_deg = 0;    ///< of a tapered ball, between its axis and its flank
+    double point_deg = 118;  ///< of a drill or a cone, across its point
+    /// From the nose up, for each piece its height and the diameters of its lower and its upper end, mm;
+    /// none: a cylinder of holder_diameter without end.
+    std::vector<double> holder_profile{};
+};
+
+/// What of a tool is above its flutes: a part of it whose under side is a disc, or a frustum of a cone under
+/// which there is nothing of the tool that is as wide.
+struct ToolSection {
+    const char* name;   ///< "shank" or "holder"
+    double above = 0;   ///< mm, of its lower end over the tip
+    double lower = 0;   ///< mm, its radius there
+    double radius = 0;  ///< mm, the largest
+    double height = 0;  ///< mm over which it widens from the one to the other; 0: at once
 };
 
 struct Material {
@@ -430,17 +446,36 @@ struct Job {
 /// Whether tools of a kind mill straight down unless the job says otherwise: ball end mills and drills do;
 /// the edges of a face mill do not reach its middle, nor do those of many flat end mills.
 [[nodiscard]] bool plunges_by_default(ToolKind kind);
-/// The lower end of a tool; a drill's is a point of 118°.
+/// The lower end of a tool.
 [[nodiscard]] CutterShape cutter_shape(const Tool& tool);
-/// Whether it roughs and finishes: flat, bull-nose and ball end mills.
+/// Whether taper, point and holder's profile are such as a tool of its kind can have.
+[[nodiscard]] bool has_flank_and_holder(const Tool& tool);
+/// Shank and holder where they stand out over the cutter, from the lowest up. Above its last piece a holder
+/// goes on as wide as that ends.
+[[nodiscard]] std::vector<ToolSection> sections_of(const Tool& tool);
+/// The same as cylinders that hold them: a frustum as steps of at most 0.5 mm, each as wide as its upper end.
+[[nodiscard]] std::vector<ToolSection> cylinders_of(const Tool& tool);
+/// What the tip of a tool is wide in which it makes a hollow: the diameter, or that of a tapered ball's tip;
+/// nothing of a cone, mm.
+[[nodiscard]] double tip_diameter(const Tool& tool);
+/// The diameter of the upright cutter of the same stick-out that bends as much as this one, mm: of a cutter
+/// with a taper 1/L³·3∫(z − a)²/d⁴ = 1/d⁴ over z from a to L, loaded at a, its tip's radius or half its
+/// largest step over the tip.
+[[nodiscard]] double bending_diameter(const Tool& tool);
+/// The diameter of the upright cutter that is bent as hard at the holder as this one where that is worst, mm.
+[[nodiscard]] double strength_diameter(const Tool& tool);
+/// Whether it roughs or finishes layers from top to bottom: flat, bull-nose, ball and tapered ball end mills.
 [[nodiscard]] bool is_end_mill(ToolKind kind);
 /// Whether it can rough a layer, level by level: flat and bull-nose end mills. A bull-nose goes where the
 /// flat around it may; what its corners leave at the foot of walls is for a flat.
 [[nodiscard]] bool roughs_layers(ToolKind kind);
-/// Whether Tool::corner_radius is one of its measures.
+/// Whether Tool::corner_radius, Tool::taper_deg or Tool::point_deg is one of its measures.
 [[nodiscard]] bool has_corner(ToolKind kind);
-/// Of what a tool clears level or meets with from the side, mm: of one with a corner its floor, else the
-/// cutter.
+[[nodiscard]] bool has_taper(ToolKind kind);
+[[nodiscard]] bool has_point(ToolKind kind);
+/// Whether its tip is a ball, with which it finishes: ball and tapered ball end mills.
+[[nodiscard]] bool has_ball_tip(ToolKind kind);
+/// Of what a tool clears level or meets with from the side, mm: of a bull-nose its floor, else the cutter.
 [[nodiscard]] double clearing_radius(const Tool& tool);
 /// Whether it cuts sideways: all but drills.
 [[nodiscard]] bool mills(ToolKind kind);

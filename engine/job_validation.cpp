@@ -48,19 +48,59 @@ void validate_corner(const Tool& tool, const std::string& key) {
     if (!has_corner(tool.kind)) {
         if (tool.corner_radius != 0)
             refuse(key, fmt::format("{} is {}, but the tool is no bull-nose", key, tool.corner_radius),
-                   "leave it out, or say kind = \"bull-nose\"");
+                   "leave it out, or say kind = \"bull-nose\" or \"tapered-ball\"");
         return;
     }
     require(
         key, tool.corner_radius, 0.01, tool.diameter / 2, Ends::closed,
         "a bull-nose has a corner between 0.01 mm and its radius: a sharper one is a flat, a rounder one a "
-        "ball");
+        "ball; a tapered ball's tip is as small");
     if (tool.corner_radius >= tool.diameter / 2)
         refuse(key, fmt::format("{} is {}, the tool's whole radius", key, tool.corner_radius),
                "say kind = \"ball\"");
     if (tool.corner_radius > tool.flute_length)
         refuse(key, fmt::format("{} is {}, more than the flute length", key, tool.corner_radius),
                "give the radius between floor and side");
+}
+
+// A tapered ball's or a cone's flank, which is to be as wide as the tool within its flutes.
+void validate_flank(const Tool& tool, const std::string& taper_key, const std::string& point_key,
+                    const std::string& diameter_key) {
+    if (!has_taper(tool.kind) && tool.taper_deg != 0)
+        refuse(taper_key, fmt::format("{} is {}, but the tool has no taper", taper_key, tool.taper_deg),
+               "leave it out, or say kind = \"tapered-ball\"");
+    if (has_taper(tool.kind))
+        require(taper_key, tool.taper_deg, 0.5, 80, Ends::closed, "a ball with no taper is kind = \"ball\"");
+    if (has_point(tool.kind)) require(point_key, tool.point_deg, 10, 170);
+    else if (tool.point_deg != Tool{}.point_deg)
+        refuse(point_key, fmt::format("{} is {}, but the tool has no point", point_key, tool.point_deg),
+               "leave it out, or say kind = \"cone\" or \"drill\"");
+    if (!has_taper(tool.kind) && tool.kind != ToolKind::cone) return;
+    const CutterShape shape = cutter_shape(tool);
+    const double flank =
+                     (shape.radius - shape.corner * std::cos(shape.taper_rad)) / std::tan(shape.taper_rad),
+                 high = shape.corner * (1 - std::sin(shape.taper_rad)) + flank;
+    if (high > tool.flute_length + 1e-6)
+        refuse(
+            diameter_key,
+            fmt::format("{} is {}, which the tool is only {:.3f} mm over its tip, above its flutes of {} mm",
+                        diameter_key, tool.diameter, high, tool.flute_length),
+            "give the diameter where the flutes end");
+}
+
+void validate_holder(const Tool& tool, const std::string& key) {
+    const std::vector<double>& profile = tool.holder_profile;
+    if (profile.empty()) return;
+    if (profile.size() % 3 != 0)
+        refuse(key, fmt::format("{} has {} numbers", key, profile.size()),
+               "give three for each piece: its height, and the diameters of its lower and its upper end");
+    for (std::size_t k = 0; k < profile.size(); ++k)
+        require(key, profile[k], 0.1, k % 3 == 0 ? 2000 : 1000, Ends::closed, kNoCutter);
+    if (std::abs(profile[1] - tool.holder_diameter) > 1e-6)
+        refuse(key,
+               fmt::format("{} begins {} mm wide, but holder_diameter is {}", key, profile[1],
+                           tool.holder_diameter),
+               "give the nose's diameter in both");
 }
 
 void validate_tool(const Tool& tool, std::size_t position, Post post) {
@@ -112,6 +152,8 @@ void validate_tool(const Tool& tool, std::size_t position, Post post) {
                "out");
     require(key("ramp_deg"), tool.ramp_deg, -90, 90);
     validate_corner(tool, key("corner_radius"));
+    validate_flank(tool, key("taper_deg"), key("point_deg"), key("diameter"));
+    validate_holder(tool, key("holder_profile"));
 }
 
 void validate_boards(const Slabs& s) {

@@ -2,12 +2,14 @@
 // alone, and the proof.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <string>
 #include <vector>
 
+#include "engine/tools/libraries.h"
 #include "io/slabwright.h"
 #include "io/write/stl_writer.h"
 #include "tests/support/edge_error.h"
@@ -78,6 +80,31 @@ TEST(EdgesOperation, LeavesLessAlongRidgesAndIsProven) {
     EXPECT_LT(convex[1].worst, 0.02);
     EXPECT_LT(concave[1].mean, concave[0].mean);
     EXPECT_GT(convex[1].least, -0.0101) << "nothing is gouged";
+}
+
+// A valley of 136 degrees keeps a ball's radius; the point of a cone of 90 goes to its bottom.
+TEST(EdgesOperation, AConeRunsAlongConcaveEdges) {
+    Context context;
+    const support::TemporaryFolder folder;
+    const Mesh mesh = ridge_and_valleys(context);
+    const std::string stl = folder / "roof.stl", out = folder / "out";
+    write_stl(stl, mesh);
+    Job job = job_with(true);
+    job.tools = forms_library();
+    const Plan made = plan(context, stl, job);
+    const std::vector<const Operation*> edges = edge_operations(made);
+    EXPECT_TRUE(std::any_of(edges.begin(), edges.end(), [](const Operation* op) { return op->tool == 7; }));
+    std::vector<test::EdgeProbe> probes = test::edge_probes(context, mesh.view(), 30);
+    std::erase_if(probes,
+                  [](const test::EdgeProbe& p) { return std::max(std::abs(p.x), std::abs(p.y)) > 38; });
+    test::cut_probes(made, probes);
+    const test::EdgeErrors concave = test::edge_errors(probes, false);
+    std::printf("concave: mean %.4f, worst %.4f mm\n", concave.mean, concave.worst);
+    EXPECT_LT(concave.mean, 0.02);
+    EXPECT_GT(concave.least, -0.0101) << "nothing is gouged";
+    write(context, made, out);
+    for (const Diagnostic& v : verify(context, out, stl, {}, 1).violations)
+        ADD_FAILURE() << v.code << ' ' << v.message;
 }
 
 TEST(EdgesOperation, IsTheSameOnAnyNumberOfThreads) {

@@ -98,9 +98,15 @@ TEST(Job, EveryKeyRoundTrips) {
     Scramble scramble{std::mt19937(seed)};
     visit_job_keys(job, scramble);
     for (Tool& tool : job.tools) visit_tool_keys(tool, scramble);
-    for (Tool& tool : job.tools) tool.corner_radius = 0;  // only a bull-nose has one
+    for (Tool& tool : job.tools) tool.corner_radius = tool.taper_deg = 0;  // not every kind has them
+    for (Tool& tool : job.tools)
+        if (tool.kind != ToolKind::drill) tool.point_deg = Tool{}.point_deg;
+    for (Tool& tool : job.tools) tool.holder_profile[1] = tool.holder_diameter;  // the nose, told twice
     job.tools[1].kind = ToolKind::bull_nose;
     job.tools[1].corner_radius = scramble.real(0.5, 2);
+    job.tools[2].kind = ToolKind::tapered_ball;
+    job.tools[2].corner_radius = scramble.real(0.5, 2);
+    job.tools[2].taper_deg = scramble.real(3, 20);
     const std::string text = job_toml(job);
     EXPECT_NE(text, job_toml(Job{}));
     const Job read = parse_job(text, "scrambled");
@@ -113,6 +119,10 @@ TEST(Job, EveryKeyRoundTrips) {
     EXPECT_EQ(read.tools[0].kind, ToolKind::drill);
     EXPECT_EQ(read.tools[1].kind, ToolKind::bull_nose);
     EXPECT_EQ(read.tools[1].corner_radius, job.tools[1].corner_radius);
+    EXPECT_EQ(read.tools[0].point_deg, job.tools[0].point_deg);
+    EXPECT_NE(read.tools[0].point_deg, Tool{}.point_deg);
+    EXPECT_EQ(read.tools[2].taper_deg, job.tools[2].taper_deg);
+    EXPECT_EQ(read.tools[2].holder_profile, job.tools[2].holder_profile);
 }
 
 TEST(Job, EveryKeyIsCommented) {

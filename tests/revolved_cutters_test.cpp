@@ -11,6 +11,7 @@
 #include <random>
 #include <vector>
 
+#include "kernels/access/revolved_depth.h"
 #include "kernels/access/standing_part.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/cutting/level_contours.h"
@@ -352,31 +353,52 @@ TEST(RevolvedCutters, ArcsCutWhatTheirChordsDo) {
     }
 }
 
-// How deep a point at (r, z), z over the tip, lies in a bull-nose: negative outside.
-double depth_in_bull_nose(const CutterShape& s, double r, double z) {
-    const double disc = s.radius - s.corner;
-    if (r <= disc && z >= s.corner) return s.corner + std::min(disc - r, z - s.corner);
-    return s.corner - std::hypot(std::max(0.0, r - disc), std::max(0.0, s.corner - z));
-}
-// The same as the distance from the sampled outline.
-double depth_by_outline(const CutterShape& s, double r, double z) {
-    double nearest = kInfinity;
-    const auto meet = [&](double r0, double z0, double r1, double z1) {
-        const double dr = r1 - r0, dz = z1 - z0, l2 = dr * dr + dz * dz;
-        const double t = l2 > 0 ? std::clamp(((r - r0) * dr + (z - z0) * dz) / l2, 0.0, 1.0) : 0.0;
-        nearest = std::min(nearest, std::hypot(r - r0 - t * dr, z - z0 - t * dz));
-    };
-    const double disc = s.radius - s.corner;
-    meet(0, 0, disc, 0);
-    constexpr int n = 3000;
-    const auto on = [&](int k) {
-        const double a = 1.5707963267948966 * k / n;
-        return std::array{disc + s.corner * std::sin(a), s.corner * (1 - std::cos(a))};
-    };
-    for (int k = 0; k < n; ++k) meet(on(k)[0], on(k)[1], on(k + 1)[0], on(k + 1)[1]);
-    meet(s.radius, s.corner, s.radius, s.corner + 100);
-    const bool is_inside = r < s.radius && z > profile_height(s, r);
-    return is_inside ? nearest : -nearest;
+// How deep a point at (r, z), z over the tip, lies in a cutter: its distance from the outline as so many
+// short lines; negative outside.
+class Outline {
+public:
+    explicit Outline(const CutterShape& s) : shape_(s) {
+        constexpr int n = 4000;
+        if (s.taper_rad == 0) add(s.radius - s.corner, 0);
+        const double turned = 1.5707963267948966 - s.taper_rad,
+                     disc = s.taper_rad > 0 ? 0 : s.radius - s.corner;
+        for (int k = 0; k <= n && s.corner > 0; ++k) {
+            const double a = turned * k / n;
+            add(disc + s.corner * std::sin(a), s.corner * (1 - std::cos(a)));
+        }
+        if (s.taper_rad > 0) add(s.radius, profile_height(s, s.radius));
+        add(s.radius, points_.back()[1] + 100);
+    }
+    [[nodiscard]] double depth(double r, double z) const {
+        double nearest = kInfinity;
+        for (std::size_t k = 0; k + 1 < points_.size(); ++k) {
+            const auto& [r0, z0] = points_[k];
+            const double dr = points_[k + 1][0] - r0, dz = points_[k + 1][1] - z0, l2 = dr * dr + dz * dz,
+                         t = l2 > 0 ? std::clamp(((r - r0) * dr + (z - z0) * dz) / l2, 0.0, 1.0) : 0.0;
+            nearest = std::min(nearest, std::hypot(r - r0 - t * dr, z - z0 - t * dz));
+        }
+        const bool is_inside = r < shape_.radius && z > profile_height(shape_, r);
+        return is_inside ? nearest : -nearest;
+    }
+
+private:
+    void add(double r, double z) { points_.push_back({r, z}); }
+    CutterShape shape_;
+    std::vector<std::array<double, 2>> points_{{0, 0}};
+};
+// The same in closed form: from the lines and the circle that the outline is made of.
+double depth_in(const CutterShape& s, double r, double z) {
+    const double side = s.radius - r;
+    if (s.taper_rad == 0) {
+        const double disc = s.radius - s.corner;
+        if (r <= disc && z >= s.corner) return std::min(side, z);
+        return s.corner - std::hypot(std::max(0.0, r - disc), std::max(0.0, s.corner - z));
+    }
+    const double sine = std::sin(s.taper_rad), cosine = std::cos(s.taper_rad), up = z - s.corner;
+    // On the circle's part of the outline everything is nearest that lies below the line square to the flank.
+    const bool below = up * cosine + r * sine < 0;
+    const double end = below ? s.corner - std::hypot(r, up) : s.corner + up * sine - r * cosine;
+    return std::min(side, end);
 }
 
 template <class F>
@@ -397,7 +419,7 @@ double deepest_of(const CutterShape& s, const Triangle3& t, const Vec3d& tip) {
             Vec3d p;
             for (std::size_t k = 0; k < 3; ++k)
                 p[k] = t[0][k] + a * ((1 - b) * (t[1][k] - t[0][k]) + b * (t[2][k] - t[0][k]));
-            return depth_in_bull_nose(s, std::hypot(p[0] - tip[0], p[1] - tip[1]), p[2] - tip[2]);
+            return depth_in(s, std::hypot(p[0] - tip[0], p[1] - tip[1]), p[2] - tip[2]);
         });
     });
 }
@@ -419,23 +441,31 @@ Mesh random_tetrahedron(Context& context, std::mt19937& random) {
     return weld(context, facets);
 }
 
-TEST(RevolvedCutters, DepthInABullNoseIsThatFromItsOutline) {
+TEST(RevolvedCutters, DepthInACutterIsThatFromItsOutline) {
     std::mt19937 random(test::seed());
-    std::uniform_real_distribution<double> ur(0, 7), uz(-1, 8);
-    const CutterShape shape{6, 1.5, 0};
-    for (int i = 0; i < 500; ++i) {
-        const double r = ur(random), z = uz(random);
-        EXPECT_NEAR(depth_in_bull_nose(shape, r, z), depth_by_outline(shape, r, z), 1e-6) << r << ' ' << z;
+    for (const auto& [name, shape] : shapes_of_all_forms()) {
+        std::uniform_real_distribution<double> ur(0, shape.radius), uz(0, 12);
+        const Outline outline(shape);
+        int inside = 0;
+        for (int i = 0; i < 200; ++i) {
+            const double r = ur(random), z = uz(random), expected = outline.depth(r, z);
+            if (expected <= 0) continue;
+            ++inside;
+            EXPECT_NEAR(depth_in(shape, r, z), expected, 1e-6) << name << ' ' << r << ' ' << z;
+            EXPECT_NEAR(depth_within(under_side(shape), r, z), expected, 1e-6)
+                << name << ' ' << r << ' ' << z;
+        }
+        EXPECT_GT(inside, 30) << name;
     }
 }
 
-TEST(RevolvedCutters, GougesOfABullNoseAreTheDeepestPoints) {
+TEST(RevolvedCutters, GougesAreTheDeepestPoints) {
     Context context;
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> u(-6, 6), uz(-5, 5);
     double worst = 0;
     int poses = 0, touching = 0;
-    for (int solid = 0; solid < poses_of(102); ++solid) {
+    for (int solid = 0; solid < poses_of(105); ++solid) {
         const Mesh mesh = random_tetrahedron(context, random);
         const StandingPart part(context, mesh.view());
         std::vector<Triangle3> all;
@@ -445,14 +475,15 @@ TEST(RevolvedCutters, GougesOfABullNoseAreTheDeepestPoints) {
                 t[k] = {mesh.vertices[f[k]].x, mesh.vertices[f[k]].y, mesh.vertices[f[k]].z};
             all.push_back(t);
         }
-        const CutterShape shape = shapes_of_all_forms()[static_cast<std::size_t>(solid) % 3].shape;
+        const std::vector<Named>& shapes = shapes_of_all_forms();
+        const CutterShape shape = shapes[static_cast<std::size_t>(solid) % shapes.size()].shape;
         for (int i = 0; i < 100; ++i, ++poses) {
             const Point3 tip{u(random), u(random), uz(random)};
             double expected = 0;
             for (const Triangle3& t : all) expected = std::max(expected, deepest_of(shape, t, tip));
             const Penetration found = part.depth(shape, 20, tip, tip, 0);
             ASSERT_NEAR(found.found ? found.depth : 0, expected, kMicrometre)
-                << "solid " << solid << ", corner " << shape.corner;
+                << "solid " << solid << ", corner " << shape.corner << ", taper " << shape.taper_rad;
             worst = std::max(worst, std::abs((found.found ? found.depth : 0) - expected));
             touching += static_cast<int>(expected > 0);
         }

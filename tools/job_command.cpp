@@ -12,7 +12,7 @@ CLI::App* add_job_command(CLI::App& app, JobOptions& options) {
                      "print a post file that writes as this control's own dialect does");
     what->require_option(1);
     command->add_option("--library", options.library,
-                        "with these tools: fixed, shop, metric, or luo (Luo table 5.4)");
+                        "with these tools: fixed, shop, forms, metric, or luo (Luo table 5.4)");
     command->add_flag("--json", options.json, "errors as JSON on stderr");
     return command;
 }

@@ -348,7 +348,7 @@ void add_common(CLI::App& command, Options& options) {
     command.add_option("--job", options.job_file, "job file; `slabwright job --defaults` prints one");
     command.add_option(
         "--tools", options.tools,
-        "tool library: fixed, shop, metric, luo, or a file .tbl, .fctl, .fctb or .csv (io/JOB.md)");
+        "tool library: fixed, shop, forms, metric, luo, or a file .tbl, .fctl, .fctb or .csv (io/JOB.md)");
     command.add_option(
         "--post", options.post,
         "instead of machine.post: linuxcnc, fanuc, haas, grbl, mach, iso, siemens, heidenhain, or "

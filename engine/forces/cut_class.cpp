@@ -16,7 +16,7 @@ double depth_of(int depth, ClassSteps steps) {
 CutClass class_of(const CutStretch& s, const Tool& tool, ClassSteps steps) {
     CutClass c;
     const double r = tool.diameter / 2;
-    if (tool.kind == ToolKind::ball)
+    if (has_ball_tip(tool.kind))
         c.low = static_cast<std::int16_t>(std::floor(std::min(s.low, r) / r * steps.low));
     const double low = c.low * r / steps.low,
                  depth = std::clamp(s.high - low, kLeastDepth, 30 * tool.diameter);

@@ -29,7 +29,7 @@ CutSegment slot_cut(const Job& job, const Tool& tool, double depth_mm) {
 
 CutSegment hardest_cut(const Job& job, const Tool& tool, double depth_mm) {
     CutSegment cut = slot_cut(job, tool, depth_mm);
-    if (tool.kind != ToolKind::ball) return cut;
+    if (!has_ball_tip(tool.kind)) return cut;
     cut.chip_load_mm = std::min({tool.max_feed, job.machine.max_feed, job.cutting.finish_feed}) /
                        (cut.spindle_rpm * tool.flutes);
     cut.arc = engagement_arc(radius_at(cut, depth_mm), job.cutting.wall_allowance + job.tolerances.rough_cusp,

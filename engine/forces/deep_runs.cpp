@@ -34,7 +34,7 @@ public:
           tool_(tool),
           round_(round),
           ask_(ask),
-          ball_(tool.kind == ToolKind::ball),
+          ball_(has_ball_tip(tool.kind)),
           for_time_(!ball_ && round == 0) {}
 
     [[nodiscard]] std::vector<DeepRun> runs() {

@@ -36,7 +36,7 @@ CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job&
                     operation.purpose, "give the tool a speed");
     s.chip_load_mm = feed / (operation.spindle_rpm * tool.flutes);
 
-    const double steps = s.ball() ? job.tolerances.rough_cusp : 0, slot = 2 * s.radius_mm;
+    const double steps = has_ball_tip(tool.kind) ? job.tolerances.rough_cusp : 0, slot = 2 * s.radius_mm;
     double depth = operation.stepdown, width = operation.stepover;
     switch (operation.kind) {
         case OperationKind::rough:
@@ -64,7 +64,7 @@ void rate_operation(Operation& operation, const Tool& tool, const Job& job) {
     if (cut.high_mm <= 0) return;
     const CutForce force = peak_force(cut);
     operation.peak_force_n = force.peak_resultant_n;
-    operation.deflection_mm = cutter_deflection(force.peak_in_plane_n, tool.stickout, tool.diameter);
+    operation.deflection_mm = cutter_deflection(force.peak_in_plane_n, tool.stickout, bending_diameter(tool));
     operation.wall_error_mm = operation.deflection_mm;
     operation.peak_torque_nmm = force.torque_nmm;
     operation.peak_power_w = force.power_w;

@@ -85,7 +85,7 @@ void check_limits(const Operation& op, const Tool& tool, const Job& job, const P
                            "a shorter or thicker tool{}",
                            op.purpose, tool.number, op.wall_error_mm, held, limit,
                            lowered ? "" : " or a smaller stepdown"));
-    const double stress = cutter_stress(peaks.in_plane.value, tool.stickout, tool.diameter);
+    const double stress = cutter_stress(peaks.in_plane.value, tool.stickout, strength_diameter(tool));
     passed.add("cut.strength", tool, peaks.in_plane, stress, tool.strength_mpa,
                fmt::format("{}: the cutter T{} would bear {:.0f} MPa in bending{}, more than its {:.0f} MPa; "
                            "use a shorter or thicker tool",
@@ -147,8 +147,8 @@ std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan,
             op.peak_force_n = peaks.resultant.value;
             op.peak_at = peaks.resultant.at;
             op.peak_move = peaks.resultant.move;
-            op.deflection_mm = cutter_deflection(peaks.in_plane.value, tool.stickout, tool.diameter);
-            op.wall_error_mm = cutter_deflection(peaks.across.value, tool.stickout, tool.diameter);
+            op.deflection_mm = cutter_deflection(peaks.in_plane.value, tool.stickout, bending_diameter(tool));
+            op.wall_error_mm = cutter_deflection(peaks.across.value, tool.stickout, bending_diameter(tool));
             op.peak_torque_nmm = peaks.torque.value;
             op.peak_power_w = peaks.power.value;
             check_limits(op, tool, job, peaks, passed);

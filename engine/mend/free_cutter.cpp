@@ -8,28 +8,33 @@ FreeCutter::FreeCutter(const StandingPart& part, double z_top, const Tool& tool,
     : part_(part),
       z_top_(z_top),
       radius_(tool.diameter / 2 + wider),
-      shank_(tool.shank_diameter > tool.diameter && tool.flute_length > 0 ? tool.shank_diameter / 2 + wider
-                                                                          : 0),
-      nose_(tool.holder_diameter > tool.diameter && tool.stickout > 0 ? tool.holder_diameter / 2 + wider : 0),
-      flute_(tool.flute_length),
-      stickout_(tool.stickout),
       most_(most),
-      ball_(tool.kind == ToolKind::ball) {}
+      shape_(cutter_shape(tool)),
+      cylinders_(cylinders_of(tool)) {
+    for (ToolSection& cylinder : cylinders_) cylinder.radius += wider;
+    // Thicker all around a cutter with a taper is one whose tip is rounder by as much and lies lower; all
+    // others have their side and no floor to go by.
+    if (shape_.taper_rad > 0) shape_.corner += wider, lower_ = wider;
+    else if (!shape_.is_ball()) shape_ = flat_cutter(radius_);
+    else shape_.corner = radius_;
+    shape_.radius = radius_;
+}
 
 bool FreeCutter::is_free(const Point3& from, const Point3& to) const {
     if (std::min(from[2], to[2]) >= z_top_) return true;
-    if ((ball_ ? part_.ball(z_top_, from, to, radius_, most_)
-               : part_.cylinder(z_top_, from, to, radius_, most_))
+    if (part_
+            .depth(shape_, z_top_, {from[0], from[1], from[2] - lower_}, {to[0], to[1], to[2] - lower_},
+                   most_)
             .found)
         return false;
-    const auto follows = [&](double radius, double above) {
-        if (radius <= 0 || std::min(from[2], to[2]) + above >= z_top_) return false;
+    return std::none_of(cylinders_.begin(), cylinders_.end(), [&](const ToolSection& cylinder) {
+        const double above = cylinder.above;
+        if (std::min(from[2], to[2]) + above >= z_top_) return false;
         return part_
-            .cylinder(z_top_, {from[0], from[1], from[2] + above}, {to[0], to[1], to[2] + above}, radius,
-                      most_)
+            .cylinder(z_top_, {from[0], from[1], from[2] + above}, {to[0], to[1], to[2] + above},
+                      cylinder.radius, most_)
             .found;
-    };
-    return !follows(shank_, flute_) && !follows(nose_, stickout_);
+    });
 }
 
 double FreeCutter::lift(const Point3& at) const {

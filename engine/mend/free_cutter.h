@@ -24,8 +24,9 @@ public:
 
 private:
     const StandingPart& part_;
-    double z_top_, radius_, shank_, nose_, flute_, stickout_, most_;
-    bool ball_;
+    double z_top_, radius_, most_, lower_ = 0;  // lower_: mm that the thicker tip lies under the tool's
+    CutterShape shape_;
+    std::vector<ToolSection> cylinders_;  // as thick as they count
 };
 
 }  // namespace slabwright

@@ -170,7 +170,7 @@ std::vector<Operation> touch_up(const Job& job, const StandingPart& part, const 
                 const double dx = m.surface[0] - t.tip[0], dy = m.surface[1] - t.tip[1],
                              r2 = dx * dx + dy * dy;
                 if (r2 > R * R) continue;
-                const double up = tool.kind == ToolKind::ball ? R - std::sqrt(R * R - r2) : 0;
+                const double up = under_side(cutter_shape(tool)).height(std::sqrt(r2));
                 if (t.tip[2] + up <= down) return true;
             }
         }
@@ -187,7 +187,7 @@ std::vector<Operation> touch_up(const Job& job, const StandingPart& part, const 
             of.push_back(touch);
     }
     std::vector<Operation> operations;
-    for (const ToolKind kind : {ToolKind::flat, ToolKind::ball})
+    for (const ToolKind kind : {ToolKind::flat, ToolKind::ball, ToolKind::tapered_ball})
         for (auto& [number, of] : touches) {
             const Tool& tool = tool_of(number);
             if (tool.kind != kind) continue;

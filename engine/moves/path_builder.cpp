@@ -11,6 +11,7 @@ namespace slabwright {
 
 namespace {
 
+constexpr double kPointMiddle = 0.1;  // mm: the same of a point
 constexpr double kBallMiddle = 0.75;  // of a ball's radius: what counts as head-on
 constexpr std::array kHelixRadii{
     0.9, 0.65, 0.45};  // of the cutter's radius: under it, so that no post is left in the middle
@@ -75,6 +76,8 @@ PathBuilder::PathBuilder(Operation& operation, const Tool& tool, double feed, do
 CutterShape PathBuilder::middle() const {
     const CutterShape& cutter = around_.cutter;
     if (cutter.is_ball()) return ball_cutter(kBallMiddle * cutter.radius);
+    if (cutter.taper_rad > 0)
+        return cutter.corner > 0 ? ball_cutter(kBallMiddle * cutter.corner) : flat_cutter(kPointMiddle);
     const bool whole = face_ && !plunges_;
     return flat_cutter(std::max(core_, whole ? cutter.radius - kRim : kMiddle * cutter.radius));
 }
@@ -257,7 +260,7 @@ bool PathBuilder::enter(std::span<const PathPoint> run) {
 // on the right of a run that climbs, so the circle's room is looked for on the other side. Whole turns, none
 // steeper than the ramp.
 bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
-    if (around_.part == nullptr || around_.cutter.is_ball()) return false;
+    if (around_.part == nullptr || around_.cutter.is_ball() || around_.cutter.taper_rad > 0) return false;
     const PathPoint& first = run.front();
     double ux = 0, uy = 0;
     for (std::size_t k = 1; k < run.size() && ux == 0 && uy == 0; ++k) {

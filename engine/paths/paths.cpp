@@ -303,7 +303,7 @@ private:
     }
     [[nodiscard]] bool last_of_kind(const Tool& tool) const {
         return std::none_of(&tool + 1, tools_.rest.data() + tools_.rest.size(),
-                            [&](const Tool& t) { return t.kind == tool.kind; });
+                            [&](const Tool& t) { return has_ball_tip(t.kind) == has_ball_tip(tool.kind); });
     }
 
     // Waste where the roughing cutter does not fit.

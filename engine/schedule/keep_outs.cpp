@@ -59,10 +59,10 @@ struct ToolPart {
     double radius, height;  // mm; of its lower end over the tip
 };
 
-std::array<ToolPart, 3> parts_of(const Tool& tool) {
-    return {ToolPart{"cutter", tool.diameter / 2, 0},
-            {"shank", tool.shank_diameter / 2, tool.flute_length},
-            {"holder", tool.holder_diameter / 2, tool.stickout}};
+std::vector<ToolPart> parts_of(const Tool& tool) {
+    std::vector<ToolPart> parts{{"cutter", tool.diameter / 2, 0}};
+    for (const ToolSection& s : cylinders_of(tool)) parts.push_back({s.name, s.radius, s.above});
+    return parts;
 }
 
 // A move that enters a zone: where, with what, and how high the tip must be to pass over all that it enters.
@@ -151,7 +151,7 @@ private:
     }
 
     const std::vector<Move>& moves_;
-    std::array<ToolPart, 3> parts_;
+    std::vector<ToolPart> parts_;
     const std::vector<KeepOutZone>& zones_;
     double widest_ = 0;
 };

@@ -30,8 +30,8 @@ std::vector<Tool> probing_tools(const Job& job) {
 double widest_below(const Tool& tool, double height) {
     double radius = -1;
     if (height > 0) radius = tool.diameter / 2;
-    if (height > tool.flute_length) radius = std::max(radius, tool.shank_diameter / 2);
-    if (height > tool.stickout) radius = std::max(radius, tool.holder_diameter / 2);
+    for (const ToolSection& s : cylinders_of(tool))
+        if (height > s.above) radius = std::max(radius, s.radius);
     return radius;
 }
 

@@ -41,6 +41,18 @@ GougeReport join(GougeReport a, const GougeReport& b) {
     return a;
 }
 
+// Of a part above the cutter, from its lower end up.
+Envelope under_side(const ToolSection& section) {
+    Envelope under;
+    under.radius = section.radius;
+    under.core = section.height > 0 ? section.lower : section.radius;
+    if (section.height > 0) {
+        const double taper = std::atan2(section.radius - section.lower, section.height);
+        under.sin_taper = std::sin(taper), under.cos_taper = std::cos(taper);
+    }
+    return under;
+}
+
 // As StandingPart::deepest() for a cutter with a point. @return the motions beyond the tolerance
 std::vector<std::uint32_t> check_pointed(const StandingPart& part, double z_top, const CutterShape& cutter,
                                          std::span<const StandingPart::Motion> motions,
@@ -72,7 +84,11 @@ Tool wider(const Tool& tool, double by) {
     Tool wide = tool;
     for (double* const diameter : {&wide.diameter, &wide.shank_diameter, &wide.holder_diameter})
         if (*diameter > 0) *diameter += 2 * by;
-    if (wide.kind == ToolKind::drill) wide.kind = ToolKind::flat;  // its point is wider too
+    for (std::size_t k = 0; k < wide.holder_profile.size(); ++k)
+        if (k % 3 != 0) wide.holder_profile[k] += 2 * by;
+    // A point and a flank are wider too: upright sides hold them.
+    if (has_point(wide.kind)) wide.kind = ToolKind::flat;
+    if (has_taper(wide.kind)) wide.kind = ToolKind::bull_nose;
     return wide;
 }
 
@@ -81,7 +97,7 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
     const std::size_t n = program.steps.size();
     if (n < 2) return {};
     const CutterShape cutter = cutter_shape(tool);
-    const double shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
+    const std::vector<ToolSection> sections = sections_of(tool);
     std::atomic<double> deepest = 0;  // of the whole program, so far
     return parallel_reduce(
         context, n - 1, kTogether, GougeReport{},
@@ -128,29 +144,30 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                     a = b;
                 }
             }
-            auto check = [&](const CutterShape& shape, GougePlace& place, std::atomic<double>* known) {
-                StandingPart::Found found =
-                    part.deepest(shape, z_top, motions, options.ignore, options.tolerance, known, chords);
+            auto check = [&](const Envelope& under, GougePlace& place, std::atomic<double>* known) {
+                StandingPart::Found found = part.deepest_under(under, z_top, motions, options.ignore,
+                                                               options.tolerance, known, chords);
                 if (found.most.found) place = {found.most.depth, lines[found.motion], found.most.tip};
                 return std::move(found.beyond);
             };
             const bool ball = cutter.form() == CutterForm::ball;
             const std::vector<std::uint32_t> gouges =
-                cutter.taper_rad > 0 ? check_pointed(part, z_top, cutter, motions, lines, options, r.cutter)
-                                     : check(cutter, r.cutter, ball ? &deepest : nullptr);
+                mills(tool.kind) ? check(under_side(cutter), r.cutter, ball ? &deepest : nullptr)
+                                 : check_pointed(part, z_top, cutter, motions, lines, options, r.cutter);
             r.gouges = gouges.size();
             add_lines(r.gouge_lines, lines_of(lines, gouges));
             std::vector<std::uint32_t> touched;
             double raised = 0;
-            auto follow = [&](GougePlace& place, double thick, double above) {
+            for (const ToolSection& section : sections) {
                 for (StandingPart::Motion& m : motions)
-                    m.from[2] += above - raised, m.to[2] += above - raised;
-                raised = above;
-                const auto beyond = check({thick, 0, 0}, place, nullptr);
+                    m.from[2] += section.above - raised, m.to[2] += section.above - raised;
+                raised = section.above;
+                GougePlace place;
+                const auto beyond = check(under_side(section), place, nullptr);
                 touched.insert(touched.end(), beyond.begin(), beyond.end());
-            };
-            if (shank > cutter.radius) follow(r.shank, shank, tool.flute_length);
-            if (nose > cutter.radius) follow(r.holder, nose, tool.stickout);
+                GougePlace& of = section.above < tool.stickout ? r.shank : r.holder;
+                if (place.depth > of.depth) of = place;
+            }
             std::sort(touched.begin(), touched.end());
             touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
             r.contacts = touched.size();

@@ -41,7 +41,9 @@ struct GougeOptions {
 /// Checks every motion, feed or rapid, from known place to known place. The error of a depth is at most
 /// StandingPart::kSheet under the layer's top and StandingPart::kNumericalError elsewhere, and more by
 /// Program::arc_error where arcs are. A drill that goes straight up or down is
-/// checked with its point; on any other way as a cylinder of its diameter, which can only overstate.
+/// checked with its point; on any other way as a cylinder of its diameter, which can only overstate. All
+/// other cutters are checked in their own form, and shank and holder with the cylinders and cones they are
+/// made of.
 [[nodiscard]] GougeReport check_gouge(Context& context, const StandingPart& part, double z_top,
                                       const Tool& tool, const Program& program,
                                       const GougeOptions& options = {});

@@ -220,11 +220,9 @@ struct Cylinder {
 class ProgramClearance {
 public:
     ProgramClearance(const Program& program, const Tool& tool, const Obstacle& obstacle)
-        : program_(program),
-          obstacle_(obstacle),
-          cylinders_{Cylinder{"cutter", tool.diameter / 2, 0},
-                     {"shank", tool.shank_diameter / 2, tool.flute_length},
-                     {"holder", tool.holder_diameter / 2, tool.stickout}} {}
+        : program_(program), obstacle_(obstacle), cylinders_{{"cutter", tool.diameter / 2, 0}} {
+        for (const ToolSection& s : cylinders_of(tool)) cylinders_.push_back({s.name, s.radius, s.above});
+    }
 
     void run(std::vector<Violation>& violations) {
         auto arc = program_.arcs.begin();
@@ -316,7 +314,7 @@ private:
 
     const Program& program_;
     const Obstacle& obstacle_;
-    std::array<Cylinder, 3> cylinders_;
+    std::vector<Cylinder> cylinders_;
     std::size_t motions_ = 0;
     double most_ = 0, away_ = 0;
     const char* part_ = "";

@@ -81,6 +81,18 @@ private:
 bool worse(const Patch& a, const Patch& b) {
     return a.nearest != b.nearest ? a.nearest < b.nearest : a.spread < b.spread;
 }
+// The flank of a tapered ball as cylinders that hold it, over the ball of its tip.
+std::vector<ToolSection> flank_of(const Tool& tool) {
+    constexpr double kStep = 0.1;  // mm
+    const CutterShape shape = cutter_shape(tool);
+    const double tangent = std::tan(shape.taper_rad), from = shape.corner * std::cos(shape.taper_rad),
+                 low = shape.corner * (1 - std::sin(shape.taper_rad));
+    std::vector<ToolSection> steps;
+    for (double r = shape.corner; r < shape.radius; r += kStep)
+        steps.push_back({"flank", low + (r - from) / tangent, 0, std::min(shape.radius, r + kStep), 0});
+    return steps;
+}
+
 }  // namespace
 
 Reach::Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_bottom, double z_top,
@@ -88,10 +100,19 @@ Reach::Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_
     : part_(part), z_bottom_(z_bottom), z_top_(z_top), lowest_(lowest) {
     // What a bull-nose reaches, a ball no wider than its floor or the flat around it reaches too, but for its
     // corners.
+    std::vector<const Tool*> sorted;
     for (const Tool& tool : tools)
-        if (tool.kind == ToolKind::flat || tool.kind == ToolKind::ball) tools_.push_back(tool);
-    std::stable_sort(tools_.begin(), tools_.end(),
-                     [](const Tool& a, const Tool& b) { return a.diameter < b.diameter; });
+        if (tool.kind == ToolKind::flat || has_ball_tip(tool.kind)) sorted.push_back(&tool);
+    std::stable_sort(sorted.begin(), sorted.end(),
+                     [](const Tool* a, const Tool* b) { return tip_diameter(*a) < tip_diameter(*b); });
+    for (const Tool* const tool : sorted) {
+        above_.push_back(has_taper(tool->kind) ? flank_of(*tool) : std::vector<ToolSection>{});
+        const std::vector<ToolSection> sections = cylinders_of(*tool);
+        above_.back().insert(above_.back().end(), sections.begin(), sections.end());
+        tools_.push_back(*tool);
+        if (has_taper(tool->kind))
+            tools_.back().kind = ToolKind::ball, tools_.back().diameter = tip_diameter(*tool);
+    }
 }
 
 bool Reach::reachable(const Point3& point) {
@@ -133,12 +154,10 @@ void Reach::remember(const Point3& obstacle) {
     else obstacles_[next_obstacle_++ % kObstacles] = obstacle;
 }
 
-bool Reach::holder_free(const Tool& tool, const Point3& tip) const {
-    for (const auto& [radius, above] : {std::pair{tool.shank_diameter / 2, tool.flute_length},
-                                        std::pair{tool.holder_diameter / 2, tool.stickout}}) {
-        if (radius <= tool.diameter / 2 || above <= 0) continue;
-        const Point3 at{tip[0], tip[1], tip[2] + above};
-        if (part_.cylinder(z_top_, at, at, radius, kTouch).found) return false;
+bool Reach::holder_free(std::size_t tool, const Point3& tip) const {
+    for (const ToolSection& s : above_[tool]) {
+        const Point3 at{tip[0], tip[1], tip[2] + s.above};
+        if (part_.cylinder(z_top_, at, at, s.radius, kTouch).found) return false;
     }
     return true;
 }
@@ -219,7 +238,7 @@ private:
     /// Whether shank and holder are free too where the cutter is.
     bool takes(const Point3& c) {
         blocked_ = Found::held;
-        if (!reach_.holder_free(tool_, {c[0], c[1], ball_ ? c[2] - R_ : c[2]})) return false;
+        if (!reach_.holder_free(index_, {c[0], c[1], ball_ ? c[2] - R_ : c[2]})) return false;
         reach_.found_ = {index_, c};
         if (reach_.places_.size() < kPlaces) reach_.places_.push_back({index_, c});
         else reach_.places_[reach_.next_place_++ % kPlaces] = {index_, c};
@@ -230,14 +249,11 @@ private:
     /// by more than the patch's size.
     [[nodiscard]] bool held_everywhere(const Patch& p) const {
         const double tip = ball_ ? point_[2] + R_ * std::cos(p.u - p.du) - R_ : point_[2];
-        for (const auto& [radius, above] : {std::pair{tool_.shank_diameter / 2, tool_.flute_length},
-                                            std::pair{tool_.holder_diameter / 2, tool_.stickout}}) {
-            if (radius <= R_ || above <= 0) continue;
-            const Point3 at{p.centre[0], p.centre[1], tip + above};
-            if (reach_.part_.beside(at, reach_.z_top_, radius).distance + p.spread < radius - kTouch)
-                return true;
-        }
-        return false;
+        const std::vector<ToolSection>& above = reach_.above_[index_];
+        return std::any_of(above.begin(), above.end(), [&](const ToolSection& s) {
+            const Point3 at{p.centre[0], p.centre[1], tip + s.above};
+            return reach_.part_.beside(at, reach_.z_top_, s.radius).distance + p.spread < s.radius - kTouch;
+        });
     }
 
     /// Whether one obstacle blocks all of a patch, by what is known now.

@@ -50,11 +50,12 @@ private:
     /// not even so.
     enum class Found { covers, held, blocked };
     [[nodiscard]] Found by(std::size_t tool, const Point3& point);
-    [[nodiscard]] bool holder_free(const Tool& tool, const Point3& tip) const;
+    [[nodiscard]] bool holder_free(std::size_t tool, const Point3& tip) const;
     void remember(const Point3& obstacle);
 
     const StandingPart& part_;
-    std::vector<Tool> tools_;  ///< smallest first
+    std::vector<Tool> tools_;                      ///< smallest first; a tapered ball as the ball of its tip
+    std::vector<std::vector<ToolSection>> above_;  ///< of each what is wider over it
     double z_bottom_, z_top_, lowest_;
     std::vector<Place> places_;      ///< free ones, found lately
     Place found_{};                  ///< by which the last point asked for is reachable

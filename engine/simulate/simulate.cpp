@@ -115,8 +115,10 @@ private:
     [[nodiscard]] std::optional<TileResult> known_tile(std::size_t tile, const CellGrid& grid) const {
         if (!changes_ || tile >= memory_->tiles.size()) return std::nullopt;
         double widest = 0;
-        for (const Tool& t : stage_.input.tools)
+        for (const Tool& t : stage_.input.tools) {
             widest = std::max({widest, t.diameter, t.shank_diameter, t.holder_diameter});
+            for (const ToolSection& section : sections_of(t)) widest = std::max(widest, 2 * section.radius);
+        }
         const TileResult& before = memory_->tiles[tile];
         if (changes_->touch(grid, widest / 2 + stage_.cell, before)) return std::nullopt;
         std::optional<TileResult> known = changes_->translated(before);

@@ -74,7 +74,8 @@ auto sayings(const Program& p) {
 
 auto words(const Tool& t) {
     return std::tie(t.number, t.kind, t.diameter, t.flute_length, t.shank_diameter, t.holder_diameter,
-                    t.stickout, t.plunges, t.core_diameter, t.ramp_deg);
+                    t.stickout, t.plunges, t.core_diameter, t.ramp_deg, t.corner_radius, t.taper_deg,
+                    t.point_deg, t.holder_profile);
 }
 
 }  // namespace

@@ -70,8 +70,8 @@ private:
     /// wider, but mostly stay above all that stands.
     [[nodiscard]] bool meets(const StepBox& box) const {
         double margin = aside_;
-        if (thick_shank_ && box.z0 + tool_.flute_length < top_) margin = std::max(margin, shank_);
-        if (thick_nose_ && box.z0 + tool_.stickout < top_) margin = std::max(margin, nose_);
+        for (const ToolSection& s : sections_)
+            if (box.z0 + s.above < top_) margin = std::max(margin, s.radius);
         return box.meets(stock_.grid(), margin, top_);
     }
 
@@ -153,8 +153,8 @@ private:
         // An arc is cut whole at the first of its chords that comes near; the others then have nothing to do.
         const bool in_arc = arc_ < arcs_.size() && arcs_[arc_].begin <= i,
                    cut_before = in_arc && arc_ < cut_arcs_;
-        const bool follows =
-            (thick_shank_ && low + tool_.flute_length < top_) || (thick_nose_ && low + tool_.stickout < top_);
+        const bool follows = std::any_of(sections_.begin(), sections_.end(),
+                                         [&](const ToolSection& s) { return low + s.above < top_; });
         const bool near = box.meets(stock_.grid(), aside_, top_) && !cut_before;
         if (!near && !follows) return;
         const bool disc = p_.end.form == CutterEnd::Form::flat && !b.rapid() && !in_arc &&
@@ -173,8 +173,11 @@ private:
         cut_level();
         if (near && in_arc) cut_arc(i);
         else if (near) cut_line(i);
-        if (thick_shank_) follow(i, shank_, tool_.flute_length, out_.shank, out_.shank_line);
-        if (thick_nose_) follow(i, nose_, tool_.stickout, out_.holder, out_.holder_line);
+        for (const ToolSection& s : sections_) {
+            const bool shank = s.above < tool_.stickout;
+            follow(i, s.radius, s.above, shank ? out_.shank : out_.holder,
+                   shank ? out_.shank_line : out_.holder_line);
+        }
     }
 
     void cut_arc(std::size_t i) {
@@ -217,9 +220,8 @@ private:
     std::size_t arc_ = 0, cut_arcs_ = 0;  // the arc at hand or next; how many have been cut
     bool any_ = false;                    // whether anything has been taken
 
-    double radius_ = tool_.diameter / 2, shank_ = tool_.shank_diameter / 2, nose_ = tool_.holder_diameter / 2;
-    bool thick_shank_ = shank_ > radius_ &&tool_.flute_length > 0,
-         thick_nose_ = nose_ > radius_ &&tool_.stickout > 0;
+    double radius_ = tool_.diameter / 2;
+    std::vector<ToolSection> sections_ = cylinders_of(tool_);
     // What an arc covers goes no farther beyond its chords.
     double aside_ = radius_ + p_.program->chord_error + kArcError;
     // A sliver that stood between passes overloads nobody; a tenth of the cutter's disc does. Where cells lie

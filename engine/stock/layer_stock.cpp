@@ -209,7 +209,7 @@ double cell_for(double finest, double cusp, double plane) {
 double stock_cell(const LayerJob& layer) {
     double finest = layer.tools.finish.diameter;
     for (const Tool& tool : layer.tools.rest)
-        if (tool.kind == ToolKind::ball) finest = std::min(finest, tool.diameter);
+        if (has_ball_tip(tool.kind)) finest = std::min(finest, tip_diameter(tool));
     const double width = layer.stock_max[0] - layer.stock_min[0],
                  depth = layer.stock_max[1] - layer.stock_min[1];
     return cell_for(finest, layer.job->tolerances.cusp, width * depth);
@@ -218,7 +218,7 @@ double stock_cell(const LayerJob& layer) {
 std::uint64_t LayerStock::bytes(const Job& job, double plane_mm2) {
     double finest = kUnbounded;
     for (const Tool& tool : job.tools)
-        if (tool.kind == ToolKind::ball) finest = std::min(finest, tool.diameter);
+        if (has_ball_tip(tool.kind)) finest = std::min(finest, tip_diameter(tool));
     const double cell = cell_for(finest, job.tolerances.cusp, plane_mm2);
     return static_cast<std::uint64_t>(13 * plane_mm2 / (cell * cell));
 }

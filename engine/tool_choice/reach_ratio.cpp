@@ -14,6 +14,9 @@ ToolShape shape_of(const Tool& tool) {
     shape.shank_radius = tool.shank_diameter / 2;
     shape.stickout = tool.stickout;
     shape.holder_radius = tool.holder_diameter / 2;
+    if (tool.holder_profile.empty()) return shape;
+    for (const ToolSection& s : cylinders_of(tool))
+        if (s.above > tool.stickout) shape.holder.push_back({s.above, s.radius});
     return shape;
 }
 

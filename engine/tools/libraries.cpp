@@ -71,6 +71,28 @@ std::vector<Tool> shop_library() {
     return tools;
 }
 
+std::vector<Tool> forms_library() {
+    std::vector<Tool> tools = Job{}.tools;
+    const auto add = [&](ToolKind kind, const char* name, const Size& size) -> Tool& {
+        Tool tool = end_mill(static_cast<int>(tools.size()) + 1, kind, size);
+        tool.name = name;
+        tools.push_back(std::move(tool));
+        return tools.back();
+    };
+    add(ToolKind::bull_nose, "bull-nose 1 in R3", in_inches("", kWhole, 50.8, 75, 50)).corner_radius = 3;
+    add(ToolKind::ball, "ball end mill 1/2 in", in_inches("", kHalf, 32, 50, 40));
+    Tool& tapered = add(ToolKind::tapered_ball, "tapered ball R1.5 to 1/4 in",
+                        {"", 0.25 * kInch, 0, 0.0625 * kInch, 28, 42, 32});
+    tapered.corner_radius = 1.5;
+    tapered.taper_deg = 5;
+    Tool& cone = add(ToolKind::cone, "cone 90 degrees", {"", 12, 0, 3, 12, 40, 32});
+    cone.point_deg = 90;
+    Tool& drill = add(ToolKind::drill, "drill 8 mm", {"", 8, 0, 8, 50, 65, 32});
+    drill.max_rpm = 6000;
+    drill.max_feed = drill.plunge_feed = 900;
+    return tools;
+}
+
 std::vector<Tool> metric_library() {
     const Size three = in_mm("3 mm", 3, kEighth, 24, 38, 32);
     const Size six = in_mm("6 mm", 6, kQuarter, 30, 45, 32);
@@ -89,6 +111,7 @@ std::vector<Tool> metric_library() {
 std::optional<std::vector<Tool>> named_library(std::string_view name) {
     if (name == "fixed") return Job{}.tools;
     if (name == "shop") return shop_library();
+    if (name == "forms") return forms_library();
     if (name == "metric") return metric_library();
     if (name == "luo") return luo_library();
     return std::nullopt;

@@ -24,8 +24,14 @@ namespace slabwright {
 /// proportion to the diameter; the rest is ours.
 [[nodiscard]] std::vector<Tool> metric_library();
 
-/// The names that named_library() knows, for people: "fixed, shop, metric or luo".
-inline constexpr std::string_view kLibraryNames = "fixed, shop, metric or luo";
+/// A cutter of each form that a shop has, eight tools: the three of the fixed set with their numbers, a
+/// bull-nose of 1 in and 3 mm, a ball end mill of 1/2 in, a tapered ball of 1.5 mm at its tip and 5° to 1/4
+/// in, a cone of 90° and 12 mm, and a drill of 8 mm and 118°, numbers 4 … 8. Stepdowns as those of
+/// shop_library().
+[[nodiscard]] std::vector<Tool> forms_library();
+
+/// The names that named_library() knows, for people: "fixed, shop, forms, metric or luo".
+inline constexpr std::string_view kLibraryNames = "fixed, shop, forms, metric or luo";
 
 /// A library by its name: `fixed` is what a job has that names no tools. None where no library has the name.
 [[nodiscard]] std::optional<std::vector<Tool>> named_library(std::string_view name);

@@ -20,7 +20,7 @@ bool stiffen(const Job& job, Tool& tool) {
     for (const Tool& other : job.tools)
         if (other.kind == tool.kind && std::abs(other.diameter - tool.diameter) < 1e-3 &&
             std::abs(other.corner_radius - tool.corner_radius) < 1e-3 &&
-            other.stickout < stiffest->stickout - 1e-9)
+            std::abs(other.taper_deg - tool.taper_deg) < 1e-3 && other.stickout < stiffest->stickout - 1e-9)
             stiffest = &other;
     if (stiffest == &tool) return false;
     const double least = tool.stepdown_min, most = tool.stepdown_max;
@@ -56,7 +56,7 @@ std::vector<Tool> rest_tools(const Job& job, const Tool& rough, double finish_di
     std::vector<Tool> rest;
     for (const Tool& tool : job.tools)
         if ((tool.kind == ToolKind::flat && tool.diameter < rough.diameter + (is_flat ? -hair : hair)) ||
-            (tool.kind == ToolKind::ball && tool.diameter < finish_diameter - 1e-9))
+            (has_ball_tip(tool.kind) && tip_diameter(tool) < finish_diameter - 1e-9))
             rest.push_back(tool);
     if (!is_flat && std::none_of(rest.begin(), rest.end(),
                                  [](const Tool& tool) { return tool.kind == ToolKind::flat; })) {
@@ -67,7 +67,8 @@ std::vector<Tool> rest_tools(const Job& job, const Tool& rough, double finish_di
         if (narrowest != nullptr) rest.push_back(*narrowest);
     }
     std::stable_sort(rest.begin(), rest.end(), [](const Tool& a, const Tool& b) {
-        return a.diameter != b.diameter ? a.diameter > b.diameter : a.kind < b.kind;
+        const double wide = tip_diameter(a), other = tip_diameter(b);
+        return wide != other ? wide > other : a.kind < b.kind;
     });
     return rest;
 }

@@ -14,10 +14,10 @@ struct LayerTools {
     Tool rough;  ///< flat or bull-nose: roughing, then floors, walls and the corners that the finish tool
                  ///< leaves
     std::vector<Tool>
-        semi_rough;  ///< flat, none or one: level by level where the roughing cutter did not fit
-    Tool finish;     ///< ball: slopes, and waste between walls before them
-    std::vector<Tool>
-        rest;  ///< flats and balls in falling size: only where something is left that they reach
+        semi_rough;          ///< flat, none or one: level by level where the roughing cutter did not fit
+    Tool finish;             ///< ball: slopes, and waste between walls before them
+    std::vector<Tool> rest;  ///< flats, balls and tapered balls with falling tips: only where something is
+                             ///< left that they reach
 };
 
 /// The fixed set: the first flat (the first bull-nose where there is no flat) and the first ball end mill of
@@ -39,9 +39,10 @@ struct LayerTools {
 [[nodiscard]] std::optional<LayerTools> stiffer_tools(const Job& job, const LayerTools& tools);
 
 /// What follows a finish tool (mm across) and a roughing tool so that nothing is left which a tool of the
-/// library reaches: the smaller flats and balls of the library, in falling size; after a bull-nose also a
-/// flat that is no smaller, the largest of those no wider or else the narrowest of all, for what its corners
-/// leave. Only the smallest of either kind is sure to be used: those before it are where much is left.
+/// library reaches: the smaller flats and balls of the library, tapered ones by their tips, in falling size;
+/// after a bull-nose also a flat that is no smaller, the largest of those no wider or else the narrowest of
+/// all, for what its corners leave. Only the smallest of either kind is sure to be used: those before it are
+/// where much is left.
 [[nodiscard]] std::vector<Tool> rest_tools(const Job& job, const Tool& rough, double finish_diameter);
 
 }  // namespace slabwright

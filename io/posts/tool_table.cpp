@@ -11,6 +11,24 @@
 
 namespace slabwright {
 
+namespace {
+
+// What a table has no word for: ", bull-nose R1.5", ", tapered-ball R1 A5" (the angle to the axis), ", cone
+// A90" and ", drill A135" (across the point; of a drill of 118 degrees nothing).
+std::string form_remark(const Tool& tool) {
+    const bool points =
+        has_point(tool.kind) && (tool.kind != ToolKind::drill || tool.point_deg != Tool{}.point_deg);
+    if (!has_corner(tool.kind) && !points) return {};
+    std::string text = tool.name.empty() ? "" : ", ";
+    text += word_of(kToolWords, tool.kind);
+    if (has_corner(tool.kind)) append_rounded(text += " R", tool.corner_radius, 4);
+    if (has_taper(tool.kind)) append_rounded(text += " A", tool.taper_deg, 4);
+    if (points) append_rounded(text += " A", tool.point_deg, 4);
+    return text;
+}
+
+}  // namespace
+
 std::string tool_table(const Job& job, const std::vector<int>& magazine) {
     std::vector<const Tool*> tools;
     for (const Tool& tool : job.tools) tools.push_back(&tool);
@@ -27,12 +45,7 @@ std::string tool_table(const Job& job, const std::vector<int>& magazine) {
         text += fmt::format("T{} P{} D", tool->number, pocket);
         append_rounded(text, tool->diameter, 4);
         text += fmt::format(" Z0 ;{}", comment_text(tool->name));
-        if (has_corner(tool->kind)) {
-            if (!tool->name.empty()) text += ", ";
-            text += fmt::format("{} R", word_of(kToolWords, tool->kind));
-            append_rounded(text, tool->corner_radius, 4);
-        }
-        text += '\n';
+        text += form_remark(*tool) + '\n';
     }
     return text;
 }

@@ -55,6 +55,10 @@ public:
         if (!value_.is_array()) fail(way_, "is no list");
         return value_.size();
     }
+    void numbers(std::vector<double>& all) const {
+        all.clear();
+        for (std::size_t i = 0; i < size(); ++i) all.push_back((*this)[i].number());
+    }
     [[nodiscard]] double number() const {
         if (!value_.is_number()) fail(way_, "is no number");
         const double v = value_.get<double>();
@@ -103,12 +107,11 @@ Tool read_tool(const Field& t) {
     Tool tool;
     tool.number = t["number"].whole();
     tool.kind = enumerator(kToolWords, t["kind"]);
-    tool.diameter = t["diameter"].number();
+    if (tool.diameter = t["diameter"].number(); !(tool.diameter > 0)) t["diameter"].fail("is no diameter");
     tool.flute_length = t["flute_length"].number();
     tool.shank_diameter = t["shank_diameter"].number();
     tool.holder_diameter = t["holder"]["diameter"].number();
     tool.stickout = t["holder"]["stickout"].number();
-    if (!(tool.diameter > 0)) t["diameter"].fail("is no diameter");
     if (t.has("name")) tool.name = t["name"].text();
     if (t.has("flutes")) tool.flutes = t["flutes"].whole();
     if (t.has("helix_deg")) tool.helix_rad = t["helix_deg"].number() * std::numbers::pi / 180;
@@ -125,6 +128,10 @@ Tool read_tool(const Field& t) {
     if (t.has("core_diameter")) tool.core_diameter = t["core_diameter"].number();
     if (t.has("ramp_deg")) tool.ramp_deg = t["ramp_deg"].number();
     if (t.has("corner_radius")) tool.corner_radius = t["corner_radius"].number();
+    if (t.has("taper_deg")) tool.taper_deg = t["taper_deg"].number();
+    if (t.has("point_deg")) tool.point_deg = t["point_deg"].number();
+    if (t["holder"].has("profile")) t["holder"]["profile"].numbers(tool.holder_profile);
+    if (!has_flank_and_holder(tool)) t["kind"].fail("has a flank or a holder that can be none");
     if (has_corner(tool.kind) && !(tool.corner_radius > 0 && tool.corner_radius < tool.diameter / 2))
         t["corner_radius"].fail(fmt::format("is no corner of a {}", word_of(kToolWords, tool.kind)));
     if (tool.core_diameter >= tool.diameter) t["core_diameter"].fail("is no less than the diameter");
@@ -155,10 +162,7 @@ public:
         if (has(name)) value = (*table_)[name].text();
     }
     void key(const char* name, std::vector<double>& values, const char*) {
-        if (!has(name)) return;
-        const Field list = (*table_)[name];
-        values.clear();
-        for (std::size_t i = 0; i < list.size(); ++i) values.push_back(list[i].number());
+        if (has(name)) (*table_)[name].numbers(values);
     }
     void key(const char* name, std::vector<std::array<double, 2>>& points, const char*) {
         if (!has(name)) return;
@@ -269,10 +273,8 @@ ReadingOptions read_reading(const Field& input, const BuildPlan& build) {
 
 std::vector<Support> read_supports(const Field& plan) {
     std::vector<Support> supports;
-    if (!plan.has("supports")) return supports;
-    const Field all = plan["supports"];
-    for (std::size_t i = 0; i < all.size(); ++i) {
-        const Field s = all[i];
+    for (std::size_t i = 0; plan.has("supports") && i < plan["supports"].size(); ++i) {
+        const Field s = plan["supports"][i];
         supports.push_back({s["layer"].whole(), s["x"].number(), s["y"].number(), s["width"].number(),
                             s["z_low"].number(), s["z_high"].number()});
         const Support& read = supports.back();
@@ -289,11 +291,10 @@ ProgramPlan read_program_plan(const Field& op) {
     if (op.has("spindle_rpm")) planned.spindle_rpm = op["spindle_rpm"].number();
     if (op.has("blend")) planned.blend = op["blend"].number();
     if (op.has("feeds")) {
-        const Field feeds = op["feeds"];
         planned.feeds.emplace();
-        for (std::size_t i = 0; i < feeds.size(); ++i) {
-            FeedLength f{feeds[i]["feed"].number(), feeds[i]["mm"].number(), {}};
-            for (std::size_t k = 0; k < 3; ++k) f.moment[k] = f.mm * feeds[i]["centre"][k].number();
+        for (std::size_t i = 0; i < op["feeds"].size(); ++i) {
+            FeedLength f{op["feeds"][i]["feed"].number(), op["feeds"][i]["mm"].number(), {}};
+            for (std::size_t k = 0; k < 3; ++k) f.moment[k] = f.mm * op["feeds"][i]["centre"][k].number();
             add_length(*planned.feeds, f);
         }
     }

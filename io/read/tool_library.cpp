@@ -57,17 +57,35 @@ std::string text_of(const fs::path& path) {
     return read_whole(path, {ErrorKind::usage, "tools.", kMostToolTableBytes, "check the path of the tools"});
 }
 
-// A row's remark is the tool's name. Of a tool with a corner it ends as tool_table() writes it: ", bull-nose
-// R1.5".
-void add_remark(std::string_view remark, const std::string& place, LibraryTool& tool) {
+// The measures of a form as tool_table() writes them behind its word, "R1" and "A5"; false for anything else.
+bool read_form(std::string_view text, ToolKind kind, LibraryTool& tool) {
+    Words words{text};
+    std::vector<StatedValue> found;
+    const auto measure = [&](char letter, const char* key) {
+        const std::string_view word = words.next();
+        double value = 0;
+        if (word.size() < 2 || word[0] != letter || !read_number(word.substr(1), value)) return false;
+        found.emplace_back(key, value);
+        return true;
+    };
+    if (has_corner(kind) && !measure('R', "corner_radius")) return false;
+    if (has_taper(kind) && !measure('A', "taper_deg")) return false;
+    if (has_point(kind) && !measure('A', "point_deg")) return false;
+    if (!words.next().empty()) return false;
+    tool.values.insert(tool.values.end(), found.begin(), found.end());
+    return true;
+}
+
+// A row's remark is the tool's name. Of a tool with a corner, a taper or a point it ends as tool_table()
+// writes it: ", bull-nose R1.5".
+void add_remark(std::string_view remark, LibraryTool& tool) {
     for (const Word<ToolKind>& kind : kToolWords) {
-        if (!has_corner(kind.value)) continue;
-        const std::string mark = fmt::format("{} R", kind.text);
+        if (!has_corner(kind.value) && !has_taper(kind.value) && !has_point(kind.value)) continue;
+        const std::string mark = fmt::format("{} ", kind.text);
         const std::size_t at = remark.rfind(mark);
-        double corner = 0;
-        if (at == std::string_view::npos || !read_number(remark.substr(at + mark.size()), corner)) continue;
+        if (at == std::string_view::npos || !read_form(remark.substr(at + mark.size()), kind.value, tool))
+            continue;
         tool.values.emplace_back("kind", std::string(kind.text));
-        tool.values.emplace_back("corner_radius", number_in(remark.substr(at + mark.size()), place));
         remark = trimmed(remark.substr(0, at));
         if (!remark.empty() && remark.back() == ',') remark = trimmed(remark.substr(0, remark.size() - 1));
         break;
@@ -105,7 +123,7 @@ std::vector<LibraryTool> read_linuxcnc(const fs::path& path) {
         if (seen.empty()) return;
         if (seen.find('T') == std::string::npos)
             refuse("syntax", place, "a row without a tool's number", "begin the row with T and the number");
-        add_remark(trimmed(row.substr(std::min(remark + 1, row.size()))), place, tool);
+        add_remark(trimmed(row.substr(std::min(remark + 1, row.size()))), tool);
         tools.push_back(std::move(tool));
     });
     return tools;
@@ -135,6 +153,7 @@ struct KeyTypes {
     void key(const char* name, int, const char*) { types.emplace_back(name, 'i'); }
     void key(const char* name, bool, const char*) { types.emplace_back(name, 'b'); }
     void key(const char* name, const std::string&, const char*) { types.emplace_back(name, 't'); }
+    void key(const char*, const std::vector<double>&, const char*) {}  // a list is no cell
     void degrees(const char* name, double, const char*) { types.emplace_back(name, 'n'); }
     template <class Enum, std::size_t N>
     void word(const char* name, Enum, const Word<Enum> (&)[N], const char*) {
@@ -251,25 +270,65 @@ const char* kind_of(const std::string& shape) {
     if (stem == "endmill") return "flat";
     if (stem == "ballend") return "ball";
     if (stem == "bullnose" || stem == "torus") return "bull-nose";
+    if (stem == "v-bit" || stem == "vbit") return "cone";
+    if (stem == "taperedballnose") return "tapered-ball";
     return stem == "drill" ? "drill" : nullptr;
+}
+
+// "118.00 °" or a plain number, degrees; none where the bit does not state it.
+std::optional<double> angle_of(const FreecadFile& file, const json& given, const char* key) {
+    const auto found = given.find(key);
+    if (found == given.end()) return std::nullopt;
+    const std::string text = found->is_string() ? found->get<std::string>() : found->dump();
+    Words words{text};
+    std::string_view digits = words.next();
+    digits = digits.substr(0, digits.find_first_not_of("+-0123456789.eE"));
+    return number_in(digits, file.place_of(key));
+}
+
+std::optional<double> length_of(const FreecadFile& file, const json& given, const char* key) {
+    const auto found = given.find(key);
+    if (found == given.end()) return std::nullopt;
+    return length_in(*found, key, file.place_of(key));
 }
 
 // The corner of a bull-nose; until 2024 FreeCAD gave the radius of its floor instead.
 void add_corner(const FreecadFile& file, const json& given, LibraryTool& tool) {
-    const auto length = [&](const char* key) -> std::optional<double> {
-        const auto found = given.find(key);
-        if (found == given.end()) return std::nullopt;
-        return length_in(*found, key, file.place_of(key));
-    };
-    if (const auto corner = length("CornerRadius")) {
+    if (const auto corner = length_of(file, given, "CornerRadius")) {
         tool.values.emplace_back("corner_radius", *corner);
         return;
     }
-    const auto floor = length("FlatRadius"), diameter = length("Diameter");
+    const auto floor = length_of(file, given, "FlatRadius"), diameter = length_of(file, given, "Diameter");
     if (!floor || !diameter)
         refuse("shape", file.place_of("shape"), "a bull-nose without CornerRadius",
                "give the bit a CornerRadius in FreeCAD");
     tool.values.emplace_back("corner_radius", *diameter / 2 - *floor);
+}
+
+// FreeCAD's TaperAngle is the whole angle, and its Diameter that of the ball.
+void add_taper(const FreecadFile& file, const json& given, LibraryTool& tool) {
+    const auto ball = length_of(file, given, "Diameter"), wide = length_of(file, given, "TaperDiameter"),
+               angle = angle_of(file, given, "TaperAngle");
+    if (!ball || !wide || !angle)
+        refuse("shape", file.place_of("shape"),
+               "a tapered ball without Diameter, TaperDiameter or TaperAngle",
+               "give the bit all three in FreeCAD");
+    tool.values.emplace_back("diameter", *wide);
+    tool.values.emplace_back("corner_radius", *ball / 2);
+    tool.values.emplace_back("taper_deg", *angle / 2);
+}
+
+// A V-bit whose TipDiameter is no more than what FreeCAD gives sharp ones has a point.
+void add_point(const FreecadFile& file, const json& given, LibraryTool& tool) {
+    constexpr double kSharp = 0.1;  // mm
+    const auto angle = angle_of(file, given, "CuttingEdgeAngle"), tip = length_of(file, given, "TipDiameter");
+    if (!angle)
+        refuse("shape", file.place_of("shape"), "a V-bit without CuttingEdgeAngle",
+               "give the bit a CuttingEdgeAngle in FreeCAD");
+    if (tip && *tip > kSharp + 1e-9)
+        refuse("shape", file.place_of("TipDiameter"), fmt::format("a V-bit with a tip of {} mm", *tip),
+               "only V-bits with a point can be planned with; leave it out of [tools] numbers");
+    tool.values.emplace_back("point_deg", *angle);
 }
 
 // FreeCAD's Length is the whole bit's, not what stands out of a holder: it states nothing here.
@@ -283,20 +342,26 @@ LibraryTool read_bit(const FreecadFile& file) {
         refuse("shape", file.place_of("shape"), "the bit has no shape", "export it from FreeCAD again");
     const char* const kind = kind_of(shape->get<std::string>());
     if (kind == nullptr)
-        refuse("shape", file.place_of("shape"),
-               fmt::format("a bit of the shape {} cannot be planned with",
-                           quoted_word(fs::path(shape->get<std::string>()).stem().string())),
-               "name the tools to take in [tools] numbers; endmill, bullnose, ballend and drill can be");
+        refuse(
+            "shape", file.place_of("shape"),
+            fmt::format("a bit of the shape {} cannot be planned with",
+                        quoted_word(fs::path(shape->get<std::string>()).stem().string())),
+            "name the tools to take in [tools] numbers; endmill, bullnose, ballend, taperedballnose, v-bit "
+            "and drill can be");
     tool.values.emplace_back("kind", std::string(kind));
     const json none = json::object();
     const auto parameters = root.find("parameter");
     const json& given = parameters != root.end() && parameters->is_object() ? *parameters : none;
+    const bool tapers = kind_of("taperedballnose") == std::string(kind);
     for (const auto& [theirs, ours] : {std::pair{"Diameter", "diameter"},
                                        {"CuttingEdgeHeight", "flute_length"},
                                        {"ShankDiameter", "shank_diameter"}})
-        if (const auto found = given.find(theirs); found != given.end())
-            tool.values.emplace_back(ours, length_in(*found, theirs, file.place_of(theirs)));
+        if (const auto mm = length_of(file, given, theirs);
+            mm && !(tapers && ours == std::string("diameter")))
+            tool.values.emplace_back(ours, *mm);
     if (kind_of("bullnose") == std::string(kind)) add_corner(file, given, tool);
+    if (tapers) add_taper(file, given, tool);
+    if (kind_of("v-bit") == std::string(kind)) add_point(file, given, tool);
     const auto attributes = root.find("attribute");
     for (const json* const table : {&given, attributes != root.end() ? &*attributes : &none}) {
         const auto flutes = table->is_object() ? table->find("Flutes") : table->end();
@@ -305,18 +370,8 @@ LibraryTool read_bit(const FreecadFile& file) {
         tool.values.push_back(stated({"flutes", 'i'}, text, file.place_of("Flutes")));
         break;
     }
-    if (const auto angle = given.find("TipAngle");
-        angle != given.end() && kind_of("drill") == std::string(kind)) {
-        const std::string text = angle->is_string() ? angle->get<std::string>() : angle->dump();
-        Words words{text};
-        const std::string place = file.place_of("TipAngle");
-        constexpr double kPoint = 118, kSame = 0.01;
-        std::string_view digits = words.next();
-        digits = digits.substr(0, digits.find_first_not_of("+-0123456789.eE"));
-        if (std::abs(number_in(digits, place) - kPoint) > kSame)
-            refuse("shape", place, fmt::format("a drill with a point of {} degrees", digits),
-                   "only drills of 118 degrees can be planned with; leave it out of [tools] numbers");
-    }
+    if (const auto angle = angle_of(file, given, "TipAngle"); angle && kind_of("drill") == std::string(kind))
+        tool.values.emplace_back("point_deg", *angle);
     return tool;
 }
 

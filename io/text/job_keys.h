@@ -88,11 +88,10 @@ inline constexpr Word<AccessRule> kAccessWords[] = {
 inline constexpr Word<RoughLimit> kRoughLimitWords[] = {{"smaller", RoughLimit::smaller},
                                                         {"finish_radius", RoughLimit::finish_radius},
                                                         {"cusp", RoughLimit::cusp}};
-inline constexpr Word<ToolKind> kToolWords[] = {{"flat", ToolKind::flat},
-                                                {"ball", ToolKind::ball},
-                                                {"face", ToolKind::face},
-                                                {"drill", ToolKind::drill},
-                                                {"bull-nose", ToolKind::bull_nose}};
+inline constexpr Word<ToolKind> kToolWords[] = {
+    {"flat", ToolKind::flat},   {"ball", ToolKind::ball},           {"face", ToolKind::face},
+    {"drill", ToolKind::drill}, {"bull-nose", ToolKind::bull_nose}, {"tapered-ball", ToolKind::tapered_ball},
+    {"cone", ToolKind::cone}};
 
 inline constexpr Word<CuttingScope> kCuttingScopeWords[] = {{"any", CuttingScope::any},
                                                             {"end-mill", CuttingScope::end_mill},
@@ -100,7 +99,9 @@ inline constexpr Word<CuttingScope> kCuttingScopeWords[] = {{"any", CuttingScope
                                                             {"ball", CuttingScope::ball},
                                                             {"face", CuttingScope::face},
                                                             {"drill", CuttingScope::drill},
-                                                            {"bull-nose", CuttingScope::bull_nose}};
+                                                            {"bull-nose", CuttingScope::bull_nose},
+                                                            {"tapered-ball", CuttingScope::tapered_ball},
+                                                            {"cone", CuttingScope::cone}};
 inline constexpr Word<CuttingChart> kChartWords[] = {{"none", CuttingChart::none},
                                                      {"mdf", CuttingChart::mdf},
                                                      {"pine", CuttingChart::pine},
@@ -125,7 +126,7 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.required();
     visit.key("number", tool.number, "T number in the machine's magazine");
     visit.required();
-    visit.word("kind", tool.kind, kToolWords, "flat, bull-nose, ball, face or drill");
+    visit.word("kind", tool.kind, kToolWords, "flat, bull-nose, ball, tapered-ball, cone, face or drill");
     visit.key("name", tool.name, "for the operator");
     visit.required();
     visit.key("diameter", tool.diameter, "mm");
@@ -137,6 +138,9 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.key("shank_diameter", tool.shank_diameter, "mm");
     visit.required();
     visit.key("holder_diameter", tool.holder_diameter, "mm, of the holder's nose");
+    if (shows(visit, !tool.holder_profile.empty()))
+        visit.key("holder_profile", tool.holder_profile,
+                  "mm, of each piece from the nose up: height, lower and upper diameter");
     visit.key("flutes", tool.flutes, "cutting edges");
     visit.degrees("helix_deg", tool.helix_rad, "degrees");
     visit.key("max_rpm", tool.max_rpm, "turns a minute");
@@ -149,17 +153,19 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.key("strength_mpa", tool.strength_mpa,
               "MPa, the cutter's own in bending, as its maker states it; 0: not checked");
     visit.key("plunges", tool.plunges,
-              "cuts straight down into stock; when left out: true for ball and drill, false for the others");
+              "cuts straight down into stock; when left out: false for flat, bull-nose and face");
     visit.key(
         "core_diameter", tool.core_diameter,
         "mm within which a flat, bull-nose or face mill has no edge; negative: 0 where it plunges, else "
         "0.3 of a flat's or bull-nose's diameter and 0.8 of a face mill's");
-    visit.key(
-        "ramp_deg", tool.ramp_deg,
-        "degrees, steepest ramp into stock; negative: 10 of a flat or bull-nose, 2 of a face mill, any of "
-        "what plunges");
+    visit.key("ramp_deg", tool.ramp_deg,
+              "degrees, steepest ramp into stock; negative: 2 of a face mill, any of what plunges, else 10");
     if (shows(visit, has_corner(tool.kind)))
-        visit.key("corner_radius", tool.corner_radius, "mm, of a bull-nose, between its floor and its side");
+        visit.key("corner_radius", tool.corner_radius, "mm, of a bull-nose's edge, of a tapered ball's tip");
+    if (shows(visit, has_taper(tool.kind)))
+        visit.key("taper_deg", tool.taper_deg, "degrees, of a tapered ball, between axis and flank");
+    if (shows(visit, has_point(tool.kind) && tool.point_deg != Tool{}.point_deg))
+        visit.key("point_deg", tool.point_deg, "degrees, of a drill or a cone, across its point");
 }
 
 /// Walks the keys of one keep-out.
@@ -181,7 +187,7 @@ void visit_keep_out_keys(KeepOutLike& keep_out, Visit& visit) {
 template <class DataLike, class Visit>
 void visit_cutting_data_keys(DataLike& data, Visit& visit) {
     visit.word("kind", data.kind, kCuttingScopeWords,
-               "of tools: any, end-mill, flat, ball, face, drill or bull-nose");
+               "of tools: any, end-mill, flat, ball, face, drill, bull-nose, tapered-ball or cone");
     visit.key("diameter_min", data.diameter_min, "mm");
     visit.key("diameter_max", data.diameter_max, "mm; 0: any");
     visit.key("flutes", data.flutes, "cutting edges; 0: any number");

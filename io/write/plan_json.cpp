@@ -76,6 +76,9 @@ void put_tool(JsonText& json, const Plan& plan, const Tool& tool) {
     json.key("name").string(tool.name);
     json.key("diameter").exact(tool.diameter);
     if (has_corner(tool.kind)) json.key("corner_radius").exact(tool.corner_radius);
+    if (has_taper(tool.kind)) json.key("taper_deg").exact(tool.taper_deg);
+    if (has_point(tool.kind) && tool.point_deg != Tool{}.point_deg)
+        json.key("point_deg").exact(tool.point_deg);
     json.key("flute_length").exact(tool.flute_length);
     json.key("shank_diameter").exact(tool.shank_diameter);
     json.key("holder")
@@ -83,8 +86,13 @@ void put_tool(JsonText& json, const Plan& plan, const Tool& tool) {
         .key("diameter")
         .exact(tool.holder_diameter)
         .key("stickout")
-        .exact(tool.stickout)
-        .end();
+        .exact(tool.stickout);
+    if (!tool.holder_profile.empty()) {
+        json.key("profile").begin_array();
+        for (const double mm : tool.holder_profile) json.exact(mm);
+        json.end();
+    }
+    json.end();
     json.key("flutes").integer(tool.flutes);
     json.key("helix_deg").rounded(tool.helix_rad * 180 / std::numbers::pi, 9);
     json.key("max_rpm").exact(tool.max_rpm);

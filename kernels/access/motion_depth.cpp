@@ -8,6 +8,7 @@
 
 #include "kernels/access/near_facets.h"
 #include "kernels/access/piece_depth.h"
+#include "kernels/access/revolved_depth.h"
 #include "kernels/access/standing_part.h"
 #include "kernels/access/standing_walk.h"
 #include "kernels/geometry/wide.h"
@@ -61,30 +62,38 @@ private:
     double ax_, ay_, ux_ = 1, uy_ = 0, length_ = 0;
 };
 
+CutterForm form_of(const Envelope& under) {
+    if (under.sin_taper > 0) return under.rounding > 0 ? CutterForm::tapered_ball : CutterForm::cone;
+    if (under.rounding <= 0) return CutterForm::flat;
+    return under.core > 0 ? CutterForm::bull_nose : CutterForm::ball;
+}
+
 /// A cutter with a layer's top.
 struct Cutter {
     Cutter() = default;
-    Cutter(const CutterShape& shape, double layer_top)
-        : form(shape.form()), radius(shape.radius), corner(shape.corner), top(layer_top) {
-        if (shape.taper_rad > 0) refuse_form(form, "how deep it is in the part");
-    }
+    Cutter(const Envelope& shape, double layer_top)
+        : form(form_of(shape)), radius(shape.radius), corner(shape.rounding), top(layer_top), under(shape) {}
     CutterForm form = CutterForm::flat;
     double radius = 0, corner = 0, top = 0;
+    Envelope under;
 
     [[nodiscard]] bool ball() const { return form == CutterForm::ball; }
+    [[nodiscard]] bool tapers() const { return under.sin_taper > 0; }
     /// What is asked of a motion is asked of so many pieces of it.
     [[nodiscard]] int pieces(const Point3& from, const Point3& to) const {
         const Point3 span = minus(to, from);
         const double length = std::sqrt(dot(span, span));
         const double count =
-            ball() ? std::max(length / StandingPart::kSpan, std::abs(span[2]) / StandingPart::kRise)
-                   : length / (from[2] == to[2] ? StandingPart::kSpan : StandingPart::kPiece);
+            ball() || tapers()
+                ? std::max(length / StandingPart::kSpan, std::abs(span[2]) / StandingPart::kRise)
+                : length / (from[2] == to[2] ? StandingPart::kSpan : StandingPart::kPiece);
         return std::max(1, static_cast<int>(std::ceil(count)));
     }
     /// Depth with the tip under the cap, the section of the part by the layer's top: that of the ball's
-    /// centre below it, or of the cylinder's floor. On a piece it is greatest at an end or where the axis
-    /// crosses the cap's outline, and the outline is an edge of facets cut at the top.
+    /// centre below it, of the cylinder's floor, or of the axis. On a piece it is greatest at an end or where
+    /// the axis crosses the cap's outline, and the outline is an edge of facets cut at the top.
     [[nodiscard]] double under_cap(const Point3& tip) const {
+        if (tapers()) return depth_within(under, 0, top - tip[2]);
         return ball() ? radius - std::max(0.0, tip[2] + radius - top) : std::min(radius, top - tip[2]);
     }
 };
@@ -102,6 +111,9 @@ struct Piece {
 template <class Shape>
 bool near(const Cutter& cutter, const Piece& piece, const Shape& shape, double highest, double depth) {
     const double reach = cutter.radius - depth + kHair, z = std::min(highest, cutter.top);
+    if (cutter.tapers())
+        return depth_within(cutter.under, std::sqrt(piece.way.distance2(shape)), z - piece.lowest) + kHair >
+               depth;
     if (!cutter.ball()) return z - piece.lowest > depth && piece.way.distance2(shape) < reach * reach;
     const double dz = std::max(0.0, piece.lowest + cutter.radius - z);
     return piece.way.distance2(shape) + dz * dz < reach * reach;
@@ -129,10 +141,20 @@ void meet_bull_nose(const Cutter& cutter, const Piece& piece, const std::array<V
     });
 }
 
+/// As meet().
+void meet_tapered(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& facet,
+                  Penetration& result) {
+    below(facet, cutter.top, [&](const Triangle& t) {
+        const Deepest d = revolved_piece_depth(piece.a, piece.b, t, cutter.under, result.depth);
+        if (d.depth > result.depth) result = {d.depth, between(piece.a, piece.b, d.t), true};
+    });
+}
+
 /// Raises the result by what one facet adds to it on one piece.
 void meet(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& facet, Penetration& result) {
     if (!near(cutter, piece, facet, std::max({facet[0].z, facet[1].z, facet[2].z}), result.depth)) return;
     if (cutter.form == CutterForm::bull_nose) return meet_bull_nose(cutter, piece, facet, result);
+    if (cutter.tapers()) return meet_tapered(cutter, piece, facet, result);
     if (cutter.ball()) {
         Point3 a = piece.a, b = piece.b;
         a[2] += cutter.radius;
@@ -184,8 +206,8 @@ Penetration motion_depth(const Cutter& cutter, const Point3& from, const Point3&
 
 }  // namespace
 
-Penetration StandingPart::depth(const CutterShape& shape, double z_top, const Point3& from, const Point3& to,
-                                double at_least) const {
+Penetration StandingPart::depth_under(const Envelope& shape, double z_top, const Point3& from,
+                                      const Point3& to, double at_least) const {
     const Cutter cutter(shape, z_top - kSheet);
     return motion_depth(
         cutter, from, to, at_least, [&](const Point3& tip) { return covered(tip[0], tip[1], cutter.top); },
@@ -481,9 +503,10 @@ bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Moti
     return true;
 }
 
-StandingPart::Found StandingPart::deepest(const CutterShape& shape, double z_top,
-                                          std::span<const Motion> motions, double ignore, double tolerance,
-                                          std::atomic<double>* known, std::span<const Chords> chords) const {
+StandingPart::Found StandingPart::deepest_under(const Envelope& shape, double z_top,
+                                                std::span<const Motion> motions, double ignore,
+                                                double tolerance, std::atomic<double>* known,
+                                                std::span<const Chords> chords) const {
     Found found;
     Search search;
     const Cutter& cutter = search.cutter = Cutter(shape, z_top - kSheet);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "kernels/access/near_facets.h"
+#include "kernels/cutting/tool_shape.h"
 #include "kernels/geometry/cutter_shape.h"
 #include "kernels/geometry/vectors.h"
 #include "kernels/mesh/bulk_memory.h"
@@ -47,10 +48,17 @@ public:
     /// tip. Depth of a point in a cutter is its distance from the cutter's surface, so that a wall that is
     /// cut too deep by d counts d, whatever its slope; in an upright cylinder, which has no upper end (flat
     /// end mill, face mill, shank, holder), the lesser of its distances from the wall and from the floor.
+    /// @param under the cutter's under side, or that of a holder, which needs no cutter's measures
     /// @param at_least only depths above this are looked for (0 or more), mm
-    /// @throws Error(usage, "tool.shape") for a cutter with a taper
+    [[nodiscard]] Penetration depth_under(const Envelope& under, double z_top, const Point3& from,
+                                          const Point3& to, double at_least) const;
+    /// The same for a cutter; one without a radius is in nothing.
+    /// @throws Error(usage, "tool.shape") for other measures that make no cutter
     [[nodiscard]] Penetration depth(const CutterShape& cutter, double z_top, const Point3& from,
-                                    const Point3& to, double at_least) const;
+                                    const Point3& to, double at_least) const {
+        if (!(cutter.radius > 0)) return {0, from, false};
+        return depth_under(under_side(cutter), z_top, from, to, at_least);
+    }
     /// The same for a ball.
     [[nodiscard]] Penetration ball(double z_top, const Point3& from, const Point3& to, double radius,
                                    double at_least) const {
@@ -93,10 +101,16 @@ public:
     ///        digits with what is known.)
     /// @param chords of the motions that run along circles, in their order: what is found is the same, but
     /// sooner
-    /// @throws Error(usage, "tool.shape") for a cutter with a taper
+    [[nodiscard]] Found deepest_under(const Envelope& under, double z_top, std::span<const Motion> motions,
+                                      double ignore, double tolerance, std::atomic<double>* known = nullptr,
+                                      std::span<const Chords> chords = {}) const;
+    /// The same for a cutter, as depth() has it.
     [[nodiscard]] Found deepest(const CutterShape& cutter, double z_top, std::span<const Motion> motions,
                                 double ignore, double tolerance, std::atomic<double>* known = nullptr,
-                                std::span<const Chords> chords = {}) const;
+                                std::span<const Chords> chords = {}) const {
+        if (!(cutter.radius > 0)) return {};
+        return deepest_under(under_side(cutter), z_top, motions, ignore, tolerance, known, chords);
+    }
 
     /// Whether there is part just under the plane z at (x, y).
     [[nodiscard]] bool covered(double x, double y, double z) const;

@@ -109,6 +109,7 @@ std::vector<Envelope> envelopes(const ToolShape& tool) {
     };
     above(tool.flute_length, tool.shank_radius);
     above(tool.stickout, tool.holder_radius);
+    for (const ToolShape::Disc& disc : tool.holder) above(disc.height, disc.radius);
     return parts;
 }
 

@@ -14,6 +14,11 @@ struct ToolShape {
     double shank_radius = 0;   ///< mm
     double stickout = 0;       ///< mm, from the tip to the holder's nose; 0: there is no holder
     double holder_radius = 0;  ///< mm
+    /// Where the holder widens above its nose, from the lowest up: a disc from that height over the tip on.
+    struct Disc {
+        double height = 0, radius = 0;  ///< mm
+    };
+    std::vector<Disc> holder{};
 };
 
 /// @throws Error(usage, "tool.shape") for measures that make no cutter, as under_side() has it, a cone, a

@@ -4,19 +4,25 @@
 #include <cmath>
 
 #include "kernels/errors.h"
+#include "kernels/forces/turn.h"
 
 namespace slabwright {
 
 CutSegment segment_of(const CutterShape& cutter) {
-    if (cutter.taper_rad > 0) refuse_form(cutter.form(), "the force");
     CutSegment segment;
     segment.radius_mm = cutter.radius;
     segment.corner_mm = cutter.corner;
+    segment.taper_rad = cutter.taper_rad;
     return segment;
 }
 
 double radius_at(const CutSegment& s, double height_mm) {
     const double r = s.radius_mm, corner = s.corner_mm;
+    if (s.tapers()) {
+        const forces::Flank flank = forces::flank_of(s);
+        if (height_mm < flank.low) return std::sqrt(height_mm * (2 * corner - height_mm));
+        return std::min(r, flank.radius + (height_mm - flank.low) * std::tan(s.taper_rad));
+    }
     return height_mm < corner ? r - corner + std::sqrt(height_mm * (2 * corner - height_mm)) : r;
 }
 

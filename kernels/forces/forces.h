@@ -67,7 +67,9 @@ enum class MillingSense : std::uint8_t { up, down };
 struct CutSegment {
     int flutes = 2;        ///< 1 … 32
     double radius_mm = 0;  ///< of the cutter
-    double corner_mm = 0;  ///< between its floor and its side: 0 of a flat, of a ball its radius
+    double corner_mm = 0;  ///< between its floor and its side: 0 of a flat, of a ball its radius; of a
+                           ///< tapered ball, that of its tip
+    double taper_rad = 0;  ///< between the axis and the flank, up to the radius; 0: upright
     double helix_rad = 0;  ///< 0 … 60°
     double low_mm = 0,
            high_mm =
@@ -77,12 +79,12 @@ struct CutSegment {
     double spindle_rpm = 0;   ///< for power; 0: power is 0
     ForceCoefficients coefficients;
 
-    [[nodiscard]] bool flat() const { return corner_mm <= 0; }
-    [[nodiscard]] bool ball() const { return !flat() && corner_mm >= radius_mm; }
+    [[nodiscard]] bool tapers() const { return taper_rad > 0; }
+    [[nodiscard]] bool flat() const { return corner_mm <= 0 && !tapers(); }
+    [[nodiscard]] bool ball() const { return corner_mm > 0 && corner_mm >= radius_mm && !tapers(); }
 };
 
 /// What a cutter takes before anything is asked of it: its measures alone.
-/// @throws Error(usage, "tool.shape") for a cutter with a taper
 [[nodiscard]] CutSegment segment_of(const CutterShape& cutter);
 
 /// The cutter's radius at a height above its tip, mm: what it cuts across there.
@@ -110,7 +112,7 @@ inline constexpr double kForceAccuracy = 1e-3;
 [[nodiscard]] SegmentForces reference_forces(const CutSegment& segment, double accuracy = kForceAccuracy);
 
 /// The same for a flat end mill, whose integral over z is elementary.
-/// @throws Error(usage, "forces.segment") also for a ball or a bull-nose
+/// @throws Error(usage, "forces.segment") also for any other form
 [[nodiscard]] SegmentForces closed_form_forces(const CutSegment& segment, double accuracy = kForceAccuracy);
 
 /// What a plan states about a cut.
@@ -126,8 +128,8 @@ struct CutForce {
 /// @param accuracy share of themselves to which peaks are found; time grows as one over its root
 [[nodiscard]] CutForce peak_force(const CutSegment& segment, double accuracy = 1e-5);
 
-/// Forces of many cuts, on an OpenCL device where there is one that passes a self-test and the cutter is no
-/// bull-nose, else by reference and closed form on the context's threads. The device's single precision
+/// Forces of many cuts, on an OpenCL device where there is one that passes a self-test and the cutter is a
+/// flat or a ball, else by reference and closed form on the context's threads. The device's single precision
 /// differs from the reference by less than 1e-4 of a segment's peak resultant; what must not depend on the
 /// machine is decided by peak_force.
 class ForceSolver {

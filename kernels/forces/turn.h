@@ -31,8 +31,9 @@ struct Turn {
     struct Piece {
         double begin = 0, length = 0;
     };
-    std::array<Piece, 6> pieces;  ///< between the turns at which a tooth comes to an end of the arc with its
-                                  ///< lower end or its upper, or with the upper end of a bull-nose's corner
+    /// Between the turns at which a tooth comes to an end of the arc with its lower end or its upper, or with
+    /// the upper end of a corner that is no ball's or of a flank.
+    std::array<Piece, 8> pieces;
     int count = 0;
 };
 
@@ -44,7 +45,20 @@ struct Rounding {
 };
 [[nodiscard]] inline Rounding rounding_of(const CutSegment& s) {
     if (s.flat()) return {false, s.radius_mm, 0};
+    if (s.tapers()) return {s.corner_mm > 0, s.corner_mm, 0};
     return {true, s.corner_mm, s.radius_mm - s.corner_mm};
+}
+
+/// Between the tip's rounding and the upright side of a cutter with a taper: from where the edge stands as
+/// steep as the taper, `radius` from the axis, up to where it is as wide as the cutter. Of others it is where
+/// their rounding ends, and has no height.
+struct Flank {
+    double low = 0, high = 0, radius = 0;  ///< mm
+};
+[[nodiscard]] inline Flank flank_of(const CutSegment& s) {
+    if (!s.tapers()) return {s.corner_mm, s.corner_mm, s.radius_mm};
+    const double from = s.corner_mm * std::cos(s.taper_rad), low = s.corner_mm * (1 - std::sin(s.taper_rad));
+    return {low, low + std::max(0.0, s.radius_mm - from) / std::tan(s.taper_rad), from};
 }
 
 /// @throws Error(usage, "forces.segment") for a segment out of range; `index` names it

@@ -28,7 +28,10 @@ const Tool* maker_of(const Job& job, double hole, double depth) {
     const Tool* widest = nullptr;
     for (const Tool& tool : job.tools) {
         if (!reaches(job, tool, depth)) continue;
-        if (tool.kind == ToolKind::drill && std::abs(tool.diameter - hole) <= kSameDowel) return &tool;
+        // The wood that is kept around dowels is for points no longer than those of 118 degrees.
+        const bool is_short = tool.point_deg >= Tool{}.point_deg;
+        if (tool.kind == ToolKind::drill && is_short && std::abs(tool.diameter - hole) <= kSameDowel)
+            return &tool;
         if (can_bore(tool, hole) && (widest == nullptr || tool.diameter > widest->diameter)) widest = &tool;
     }
     return widest;

@@ -39,14 +39,17 @@ struct EdgeTool {
     const Tool* tool = nullptr;
     const DropIndex* drops = nullptr;
     CutterEnd end;
-    Loops room;  ///< where its middle may be beside a flask
-    double radius = 0;
-    bool ball = false;
+    Loops room;                  ///< where its middle may be beside a flask
+    double radius = 0, tip = 0;  ///< of the cutter, and of the ball that its tip is
+    bool ball = false;           ///< its tip is one
 
+    [[nodiscard]] bool ends_in_point() const { return tool->kind == ToolKind::cone; }
     /// Height of its lower end over the tip at a distance from the axis; infinite beside it, mm.
     [[nodiscard]] double height(double from_axis) const {
         if (from_axis > radius) return kUncovered;
-        if (ball) return radius - std::sqrt(std::max(0.0, radius * radius - from_axis * from_axis));
+        if (end.form == CutterEnd::Form::cone) return end.slope * from_axis;
+        if (ball && end.form == CutterEnd::Form::ball)
+            return radius - std::sqrt(std::max(0.0, radius * radius - from_axis * from_axis));
         return end.form == CutterEnd::Form::other ? end.under.height(from_axis) : 0;
     }
 };
@@ -110,15 +113,24 @@ std::vector<TipOffset> flat_offsets(const SharpEdge& edge, double radius) {
     return offsets;
 }
 
+// A cone goes along a concave edge with its point in it; whether its flanks are free there, drops tell.
+std::vector<TipOffset> point_offsets(const SharpEdge& edge) {
+    const auto& [a, b] = edge.normals;
+    if (edge.convex || !(a[2] > kDown && b[2] > kDown)) return {};
+    return {{0, 0, kClear}};
+}
+
 class EdgePaths {
 public:
-    EdgePaths(const LayerCut& cut, LayerStock& stock)
-        : cut_(cut), stock_(stock), limit_(2 * cut.job.tolerances.gouge) {}
+    /// @param points by cones; else by all other tools
+    EdgePaths(const LayerCut& cut, LayerStock& stock, bool points)
+        : cut_(cut), stock_(stock), points_(points), limit_(2 * cut.job.tolerances.gouge) {}
 
     std::vector<Operation> run() {
+        list_tools();
+        if (tools_.empty()) return {};
         const std::vector<SharpEdge> edges = edges_in(cut_);
         if (edges.empty()) return {};
-        list_tools();
         std::vector<std::vector<EdgePlaces>> places(edges.size());
         parallel_each(cut_.context, edges.size(), [&](std::size_t e) { places[e] = places_along(edges[e]); });
         std::vector<Operation> operations;
@@ -131,12 +143,18 @@ private:
     // The finish tool is preferred; then smaller ones, then the flats.
     void list_tools() {
         const LayerTools& tools = cut_.layer.tools;
+        if (points_) {
+            for (const Tool& tool : cut_.job.tools)
+                if (tool.kind == ToolKind::cone) add(tool);
+            return;
+        }
         add(tools.finish);
         for (const Tool& tool : tools.rest) add(tool);
         add(tools.rough);
         double finest = kAlong * kUnitsPerMm;
         for (const EdgeTool& t : tools_)
-            finest = std::min(finest, static_cast<double>(safe_step(t.radius, cut_.job.tolerances.gouge)));
+            if (!t.ends_in_point())
+                finest = std::min(finest, static_cast<double>(safe_step(t.tip, cut_.job.tolerances.gouge)));
         along_ = finest / kUnitsPerMm;
     }
     void add(const Tool& tool) {
@@ -145,7 +163,8 @@ private:
         t.drops = &cut_.drops(cutter_shape(tool));
         t.end = cutter_end(tool);
         t.radius = tool.diameter / 2;
-        t.ball = tool.kind == ToolKind::ball;
+        t.tip = tip_diameter(tool) / 2;
+        t.ball = has_ball_tip(tool.kind);
         if (!cut_.layer.opening.empty()) t.room = flask_room(cut_, t.radius);
     }
 
@@ -155,7 +174,9 @@ private:
         const auto n = static_cast<std::size_t>(std::ceil(mm / along_));
         std::vector<std::vector<TipOffset>> offsets;
         for (const EdgeTool& t : tools_)
-            offsets.push_back(t.ball ? ball_offsets(edge, t.radius) : flat_offsets(edge, t.radius));
+            offsets.push_back(t.ball              ? ball_offsets(edge, t.tip)
+                              : t.ends_in_point() ? point_offsets(edge)
+                                                  : flat_offsets(edge, t.radius));
         std::vector<EdgePlaces> places;
         std::vector<MetPoints> met(tools_.size());
         for (std::size_t k = 0; k <= n; ++k) {
@@ -213,11 +234,19 @@ private:
         return best;
     }
 
+    // How deep under the layer's top it may go, mm: a shank no wider than the cutter may follow it.
+    [[nodiscard]] double depth_of(const Tool& tool) const {
+        if (tool.shank_diameter > tool.diameter) return max_layer_of(cut_.job, tool);
+        return tool.stickout - cut_.job.cutting.holder_clearance;
+    }
+
     // The tip where it touches the edge; none where something keeps it away from there.
     [[nodiscard]] std::optional<Vec3d> tip_at(const EdgeTool& t, const Vec3d& wanted, MetPoints& met) const {
         const LayerJob& layer = cut_.layer;
         const double x = to_mm(to_units(wanted[0])), y = to_mm(to_units(wanted[1]));
-        const double lowest = t.ball ? layer.floor_below : std::max(layer.floor_below, layer.z_bottom);
+        const double lowest =
+            std::max(t.ball ? layer.floor_below : std::max(layer.floor_below, layer.z_bottom),
+                     layer.z_top - depth_of(*t.tool));
         if (x < cut_.low(0, t.radius) || x > cut_.high(0, t.radius) || y < cut_.low(1, t.radius) ||
             y > cut_.high(1, t.radius))
             return std::nullopt;
@@ -256,8 +285,10 @@ private:
     [[nodiscard]] std::optional<Operation> operation(std::size_t tool,
                                                      const std::vector<std::vector<EdgePlaces>>& places) {
         const EdgeTool& t = tools_[tool];
-        const double chord = safe_chord_mm(t.radius, cut_.job.tolerances.gouge);
-        const Slide slide{t.drops, t.ball, chord, cut_.layer.z_top, kNear, 0};
+        // A point goes straight from place to place along its edge, as a ball does that fits there.
+        const double chord =
+            t.ends_in_point() ? 1.5 * along_ : safe_chord_mm(t.tip, cut_.job.tolerances.gouge);
+        const Slide slide{t.drops, t.ball || t.ends_in_point(), chord, cut_.layer.z_top, kNear, 0};
         std::vector<std::vector<PathPoint>> runs;
         double mm = 0;
         for (const std::vector<EdgePlaces>& edge : places)
@@ -287,6 +318,7 @@ private:
 
     const LayerCut& cut_;
     LayerStock& stock_;
+    bool points_;
     double limit_, along_ = kAlong;  // mm
     std::vector<EdgeTool> tools_;
 };
@@ -294,7 +326,10 @@ private:
 }  // namespace
 
 std::vector<Operation> follow_edges(const LayerCut& cut, LayerStock& stock) {
-    return EdgePaths(cut, stock).run();
+    // What balls leave in a hollow is for points.
+    std::vector<Operation> operations = EdgePaths(cut, stock, false).run();
+    for (Operation& op : EdgePaths(cut, stock, true).run()) operations.push_back(std::move(op));
+    return operations;
 }
 
 }  // namespace slabwright

@@ -10,8 +10,9 @@ namespace slabwright {
 
 /// Follows convex edges on both sides, a ball's centre at edge + R·n of either face, and concave ones where
 /// the cutter touches both faces; only where more than twice the gouge tolerance stands within kEdgeBand and
-/// that cutter lowers it. Of the layer's tools each stretch gets the one that leaves least there. Places that
-/// would gouge, or that something else keeps the cutter away from, are left out.
+/// that cutter lowers it. Of the layer's tools each stretch gets the one that leaves least there; the
+/// cones of the job then go into what is left of concave ones. Places that would gouge, or that something
+/// else keeps the cutter away from, are left out.
 /// @returns an operation for each tool that has something to do, what they cut taken off the stock
 /// @throws Error(cancelled)
 [[nodiscard]] std::vector<Operation> follow_edges(const LayerCut& cut, LayerStock& stock);

@@ -44,7 +44,7 @@ public:
         op.spare = pass_.allowance;
         if (targets_.count() == 0) return op;
         find_room();
-        index_ = &cut_.drops(ball_ ? ball_cutter(wide_) : flat_cutter(wide_));
+        index_ = &cut_.drops(dropped());
         {
             LayerStock::Trial places(stock_);  // the stock stands as before when its lines are known
             lay_lines();
@@ -67,6 +67,13 @@ public:
     }
 
 private:
+    // The cutter, thicker all around by what is kept off walls; a flat end mill on its side alone.
+    [[nodiscard]] CutterShape dropped() const {
+        if (!ball_) return flat_cutter(wide_);
+        if (!has_taper(tool_.kind)) return ball_cutter(wide_);
+        return {r_ + pass_.allowance, wide_, cutter_shape(tool_).taper_rad};
+    }
+
     void append_between(std::vector<Place>& line, std::int32_t y, Place b, MetPoints& met) const {
         if (!line.empty() && b.x - line.back().x <= step_ && b.x - line.back().x > 2 * finest_ &&
             (too_far(line.back(), b, 0) || too_steep(line.back(), b))) {
@@ -88,8 +95,8 @@ private:
     void lay_lines() {
         const CellGrid& grid = stock_.grid();
         const auto [first, last] = targets_.rows();
-        spacing_ = std::max(1, to_units(pass_.in_steps ? 0.7 * r_
-                                        : ball_        ? std::sqrt(8 * r_ * cut_.job.tolerances.cusp)
+        spacing_ = std::max(1, to_units(pass_.in_steps ? 0.7 * tip_r_
+                                        : ball_        ? std::sqrt(8 * tip_r_ * cut_.job.tolerances.cusp)
                                                        : std::min(1.0, r_ / 4)));
         const auto low = static_cast<std::int32_t>(std::floor((grid.y(first) - r_) * kUnitsPerMm / spacing_)),
                    high = static_cast<std::int32_t>(std::ceil((grid.y(last) + r_) * kUnitsPerMm / spacing_));

@@ -26,21 +26,23 @@ RestPlaces::RestPlaces(const LayerCut& cut, LayerStock& stock, const Tool& tool,
       stock_(stock),
       tool_(tool),
       pass_(pass),
-      ball_(tool.kind == ToolKind::ball),
+      ball_(has_ball_tip(tool.kind)),
       r_(tool.diameter / 2),
-      wide_(r_ + pass.allowance),
+      tip_r_(tip_diameter(tool) / 2),
+      wide_(tip_r_ + pass.allowance),
       under_(ball_ ? pass.allowance : 0),
       end_(cutter_end(tool)),
+      lowering_(has_taper(tool.kind) ? under_side(cutter_shape(tool)).eroded(pass.skin) : Envelope{}),
       targets_(cut.context, stock, pass, finish_slopes(cut.job.cutting).levels_from,
                (!pass.in_steps || pass.skin > 0)
-                   ? &cut.drops(flat_cutter(pass.in_steps ? std::min(pass.limit, r_ / 2) : pass.limit))
+                   ? &cut.drops(flat_cutter(pass.in_steps ? std::min(pass.limit, tip_r_ / 2) : pass.limit))
                    : nullptr,
                r_),
       tolerance_(std::max(cut.job.tolerances.gouge, pass.allowance)),
       chord_(safe_chord_mm(wide_, tolerance_)),
       step_(safe_step(wide_, tolerance_)),
       finest_(to_units(std::max(kFinest, 2 * pass.allowance))),
-      finest_step_(safe_step(r_, cut.job.tolerances.gouge)) {}
+      finest_step_(safe_step(tip_r_, cut.job.tolerances.gouge)) {}
 
 double RestPlaces::worth(std::size_t cell) const {
     return pass_.in_steps ? pass_.limit / 2
@@ -55,7 +57,10 @@ bool RestPlaces::lowers(double x, double y, double tip, double slack) const {
         const std::size_t c = grid.index(i, j);
         if (stock_.height(c) <= above) return false;
         double z = above;
-        if (ball_) {
+        if (lowering_.radius > 0) {
+            const double from_axis = std::max(0.0, std::hypot(grid.x(i) - x, grid.y(j) - y) - slack);
+            z += lowering_.height(std::min(core, from_axis)) - lowering_.low;
+        } else if (ball_) {
             const double dx = grid.x(i) - x, dy = grid.y(j) - y,
                          from_axis = std::max(0.0, std::sqrt(dx * dx + dy * dy) - slack);
             z += core - std::sqrt(std::max(0.0, core * core - from_axis * from_axis));
@@ -118,7 +123,7 @@ RestPlace RestPlaces::place(std::int32_t ux, std::int32_t uy, MetPoints& met, bo
     };
     // A flat end mill stands on the layer's bottom; a ball may pass it where its shape needs it, over
     // waste only for what it leaves beside its tip there.
-    const bool waste = ball_ && on_surface <= cut_.layer.z_bottom - r_;
+    const bool waste = ball_ && on_surface <= cut_.layer.z_bottom - tip_r_;
     stand(ball_ && !waste ? cut_.layer.floor_below : cut_.layer.z_bottom);
     if (waste && p.reachable && !p.useful && !pass_.in_steps &&
         lowers(x, y, std::max(on_surface, cut_.layer.floor_below)))

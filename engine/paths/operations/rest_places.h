@@ -65,12 +65,12 @@ protected:
     LayerStock& stock_;
     const Tool& tool_;
     const RestPass& pass_;
-    bool ball_;
-    double r_;
+    bool ball_;         // its tip is one
+    double r_, tip_r_;  // mm: of the cutter, and of the ball that its tip is
     double wide_,
-        under_;  // mm: the radius of the cutter that is dropped, and how far its tip then lies under this
-                 // one's
+        under_;  // mm: the radius of the tip that is dropped, and how far it then lies under this one's
     CutterEnd end_;
+    Envelope lowering_;  // of a cutter with a taper: what of it is deeper than the pass's skin
     RestTargets targets_;
     double tolerance_;  // mm of which chords and thinning take their shares: the gouge tolerance, or the
                         // allowance

@@ -55,8 +55,11 @@ Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
     Surroundings around{standing, part, cutter};
     // Where the places are those of a wider cutter, half of what it is wider by may go.
     const double wider = part != nullptr ? part->cutter().radius - cutter.radius : 0;
-    around.chord = safe_chord_mm(cutter.radius, std::max(job.tolerances.gouge, wider / 2));
-    around.under = cutter.is_ball() ? wider : 0;
+    // Of a tip that is rounder or sharper than the cutter is wide, what goes into its chords is that.
+    constexpr double kSharpest = 0.05;  // mm
+    const double round = cutter.taper_rad > 0 ? std::max(cutter.corner, kSharpest) : cutter.radius;
+    around.chord = safe_chord_mm(round, std::max(job.tolerances.gouge, wider / 2));
+    around.under = has_ball_tip(tool.kind) ? wider : 0;
     around.ramp_deg = job.cutting.ramp_deg;
     around.no_way_in = &no_way_in;
     around.lowest_rapid = layer.z_bottom + PathBuilder::kStop;

@@ -37,9 +37,14 @@ export function words(text) {
     return text.replaceAll('_', ' ');
 }
 
-// What kind of cutter a tool is, with the corner that only a bull-nose has.
+// The measures of a form beside its diameter: the corner of a bull-nose or a tapered ball, angles of flank and point.
+export function formOf(tool) {
+    return (tool.corner_radius ? ` R${figure(tool.corner_radius, 3)}` : '') + (tool.taper_deg ? ` ${figure(tool.taper_deg, 2)}°` : '') + (tool.point_deg ? ` ${figure(tool.point_deg, 1)}°` : '');
+}
+
+// What kind of cutter a tool is, with them.
 export function cutterOf(tool) {
-    return words(tool.kind) + (tool.corner_radius ? ` R${figure(tool.corner_radius, 3)}` : '');
+    return words(tool.kind) + formOf(tool);
 }
 
 export function bytesOf(text) {

@@ -1,6 +1,6 @@
 // What hangs at the machine: a cover with what to load and how long it takes, and one printed page for each layer.
 
-import {duration, figure, make, plural, words} from './dom.js';
+import {duration, figure, formOf, make, plural, words} from './dom.js';
 import {boardsText, costText, cutListSheet} from './cutlist.js';
 import {dowelsIn, keepOutsIn, planView, sideView, stackView, supportsIn} from './drawing.js';
 import {blankOf, blankSize, data, fileOf, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
@@ -65,7 +65,7 @@ function table(head, rows, numeric = []) {
 function toolRows(uses, key) {
     const numbers = [...new Set(uses.map(o => o.tool))].sort((a, b) => a - b);
     return numbers.map(number => ({number, tool: toolOf(number), list: uses.filter(o => o.tool === number)})).filter(r => r.tool).map(({number, tool, list}) => [
-        tick(`${key}:T${number}`, `T${number} loaded and measured`, true), make('strong', {}, `T${number}`), tool.name, figure(tool.diameter, 3) + (tool.corner_radius ? ` R${figure(tool.corner_radius, 3)}` : ''), make('strong', {}, figure(tool.holder.stickout, 1)),
+        tick(`${key}:T${number}`, `T${number} loaded and measured`, true), make('strong', {}, `T${number}`), tool.name, figure(tool.diameter, 3) + formOf(tool), make('strong', {}, figure(tool.holder.stickout, 1)),
         figure(tool.flute_length, 1), span(list.map(o => o.spindle_rpm), ''), feedsOf(list)]);
 }
 const toolHead = ['✓', 'Place', 'Tool', 'Ø mm', 'Stick-out mm', 'Flutes mm', 'rpm', 'Feed mm/min'];

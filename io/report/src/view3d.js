@@ -869,14 +869,24 @@ function cutterMeshes(tool) {
         return mesh;
     };
     const r = tool.diameter / 2, flute = tool.flute_length, shank = tool.shank_diameter / 2, stick = tool.holder.stickout, nose = tool.holder.diameter / 2, end = [];
-    if (tool.kind === 'drill') end.push([0, 0], [r, r * Math.tan(31 * Math.PI / 180)]);
-    else {
+    if (tool.kind === 'drill' || tool.kind === 'cone') end.push([0, 0], [r, r / Math.tan((tool.point_deg || 118) / 2 * Math.PI / 180)]);
+    else if (tool.kind === 'tapered-ball') {
+        const corner = tool.corner_radius, taper = tool.taper_deg * Math.PI / 180, turned = Math.PI / 2 - taper;
+        for (let k = 0; k <= 10; ++k) end.push([corner * Math.sin(k * turned / 10), corner * (1 - Math.cos(k * turned / 10))]);
+        end.push([r, corner * (1 - Math.sin(taper)) + (r - corner * Math.cos(taper)) / Math.tan(taper)]);
+    } else {
         const corner = tool.kind === 'ball' ? r : tool.corner_radius || 0;
         end.push([0, 0]);
         for (let k = 0; k <= 10; ++k) end.push([r - corner + corner * Math.sin(k * Math.PI / 20), corner * (1 - Math.cos(k * Math.PI / 20))]);
     }
     const meshes = [turned([...end, [r, flute], [0, flute]], edge), turned([[0, flute], [shank, flute], [shank, Math.max(flute, stick)], [0, Math.max(flute, stick)]], steel)];
-    meshes.push(turned([[0, stick], [nose, stick], [nose, stick + 25], [0, stick + 25]], holder));
+    const profile = tool.holder.profile || [25, 2 * nose, 2 * nose], around = [[0, stick]];
+    let above = stick;
+    for (let k = 0; k + 2 < profile.length; k += 3) {
+        around.push([profile[k + 1] / 2, above], [profile[k + 2] / 2, above + profile[k]]);
+        above += profile[k];
+    }
+    meshes.push(turned([...around, [0, above]], holder));
     return meshes;
 }
 
