@@ -36,6 +36,16 @@ struct Box {
     }
 };
 
+// Of each part of kPart moves, with where it begins.
+std::vector<Box> boxes_of_parts(const std::vector<Move>& moves) {
+    std::vector<Box> parts((moves.size() + kPart - 1) / kPart);
+    for (std::size_t i = 0; i < moves.size(); ++i) {
+        parts[i / kPart].add(moves[i]);
+        if (i % kPart == 0 && i > 0) parts[i / kPart].add(moves[i - 1]);
+    }
+    return parts;
+}
+
 // Lowers cells of a band of rows.
 struct Lowering {
     float* height;
@@ -375,11 +385,8 @@ Taken LayerStock::cut(Context& context, const Operation& operation, const Tool& 
     auto over_bottom = [&](const Move& m) {
         return std::array<double, 3>{to_mm(m.x), to_mm(m.y), to_mm(m.z) - z_bottom_};
     };
-    std::vector<Box> boxes((moves.size() + kBlock - 1) / kBlock), parts((moves.size() + kPart - 1) / kPart);
-    for (std::size_t i = 0; i < moves.size(); ++i) {
-        parts[i / kPart].add(moves[i]);
-        if (i % kPart == 0 && i > 0) parts[i / kPart].add(moves[i - 1]);
-    }
+    const std::vector<Box> parts = boxes_of_parts(moves);
+    std::vector<Box> boxes((moves.size() + kBlock - 1) / kBlock);
     for (std::size_t i = 0; i < parts.size(); ++i) boxes[i / (kBlock / kPart)].add(parts[i]);
     // The lowest first, whatever their order is: of what they leave a cell keeps the least, and over places
     // cut low the higher levels of a roughing need not be looked at cell by cell.
