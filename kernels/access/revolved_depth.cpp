@@ -65,7 +65,7 @@ private:
     }
     std::array<PrismFace, 8> faces_;
     std::size_t count_ = 0;
-    double top_ = -1e300;
+    double top_ = -kUnbounded;
 };
 
 }  // namespace
