@@ -14,6 +14,7 @@
 #include "kernels/statistics/distributions.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
@@ -23,8 +24,8 @@ namespace {
 using support::run_command;
 using support::TemporaryFolder;
 
-const std::string command = SLABWRIGHT_COMMAND;
-const std::string brazing = SLABWRIGHT_SOURCE_DIR "/tests/data/fdff-brazing.csv";
+const std::string command = support::built_command();
+const std::string brazing = support::checkout("tests/data/fdff-brazing.csv");
 
 BondTests random_tests(std::mt19937& random, bool balanced) {
     BondTests tests;

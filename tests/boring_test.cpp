@@ -14,6 +14,7 @@
 #include "kernels/mesh/weld.h"
 #include "tests/support/drilled_plate.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
 
@@ -104,7 +105,7 @@ TEST(Boring, RoundHolesWithoutADrillAreBoredAndProven) {
         const std::string out = folder / (bores ? "bored" : "milled");
         write(context, made, out);
         EXPECT_EQ(support::schema_complaint(support::slurp(out + "/plan.json"),
-                                            SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
+                                            support::checkout("io/plan.schema.json")),
                   "");
         for (const Diagnostic& v : verify(context, out, stl, {}, 1).violations)
             ADD_FAILURE() << v.code << ' ' << v.message;

@@ -20,6 +20,7 @@
 #include "kernels/errors.h"
 #include "tests/support/block_build.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/seed.h"
 #include "tests/support/shuffled_steps.h"
 #include "tests/support/temporary_folder.h"
@@ -491,7 +492,7 @@ TEST(SequenceReader, RefusesWhatIsNoSequence) {
 
 // Plans as the planner makes them, read back from their folder: nothing is told of any of them.
 TEST(BuildReplay, NothingIsToldOfThePlannersOwnBuilds) {
-    const std::string stl = std::string(SLABWRIGHT_SOURCE_DIR) + "/tests/data/half-sphere.stl";
+    const std::string stl = support::checkout("tests/data/half-sphere.stl");
     struct Variant {
         const char* name;
         std::function<void(Job&)> change;

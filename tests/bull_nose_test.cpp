@@ -16,6 +16,7 @@
 #include "kernels/stock/stock.h"
 #include "nlohmann/json.hpp"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
@@ -27,7 +28,7 @@ using support::slurp;
 using support::spit;
 using support::TemporaryFolder;
 
-const std::string kData = SLABWRIGHT_SOURCE_DIR "/tests/data/";
+const std::string kData = support::checkout("tests/data/");
 
 std::string tool_text(int number, const char* kind, double diameter, const char* more = "") {
     const bool face = std::string(kind) == "face";

@@ -17,6 +17,7 @@
 #include "tests/support/command.h"
 #include "tests/support/drilled_plate.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/rs274.h"
 #include "tests/support/temporary_folder.h"
 
@@ -32,7 +33,7 @@ using nlohmann::json;
 
 namespace {
 
-const std::string kData = SLABWRIGHT_SOURCE_DIR "/tests/data/";
+const std::string kData = support::checkout("tests/data/");
 
 void write_metre_pattern(const std::string& path, const MetrePattern& pattern) {
     std::ofstream stl(path, std::ios::binary);
@@ -46,7 +47,7 @@ void write_metre_pattern(const std::string& path, const MetrePattern& pattern) {
 CommandResult slabwright_command(std::vector<std::string> arguments,
                                  const std::vector<std::pair<std::string, std::string>>& environment = {},
                                  double interrupt_after = -1) {
-    arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
+    arguments.insert(arguments.begin(), support::built_command());
     return run_command(arguments, environment, interrupt_after);
 }
 
@@ -379,8 +380,6 @@ TEST(Command, InterruptStopsWithinHalfASecondAndLeavesNothing) {
         }
         ++interrupted;
         std::printf("SIGINT after %.2f s: ended %.3f s later\n", after, result.after_interrupt);
-        if (after < 0.1 && result.signal == SIGINT)
-            continue;  // before the command had its handler: nothing was begun
         EXPECT_EQ(result.exit, 6) << result.err;
         expect_one_line(result);
         EXPECT_LT(result.after_interrupt, kCancelSeconds);
@@ -430,7 +429,8 @@ TEST(Command, WhatDoesNotReachStdoutIsAnError) {
                                                {"plan", stl, "-o", out, "--no-verify"},
                                                {"plan", stl, "-o", out, "--no-verify", "--json"},
                                                {"verify", out, "--stl", stl}}) {
-        std::vector<std::string> all = {"/bin/sh", "-c", "exec \"$@\" >/dev/full", "sh", SLABWRIGHT_COMMAND};
+        std::vector<std::string> all = {"/bin/sh", "-c", "exec \"$@\" >/dev/full", "sh",
+                                        support::built_command()};
         all.insert(all.end(), arguments.begin(), arguments.end());
         const CommandResult result = run_command(all);
         EXPECT_EQ(result.exit, 3) << arguments.front() << result.err;
@@ -474,13 +474,14 @@ TEST(Command, AHangUpCancels) {
     fs::create_directory(folder.path / "place");
     const std::string line = "exec timeout -s HUP 2 \"$@\"";
     CommandResult result =
-        run_command({"/bin/sh", "-c", line, "sh", SLABWRIGHT_COMMAND, "plan", folder / "big.stl", "-o",
+        run_command({"/bin/sh", "-c", line, "sh", support::built_command(), "plan", folder / "big.stl", "-o",
                      folder / "place/a/out", "--allow-undercut", "--no-verify"});
     EXPECT_NE(result.err.find("cancelled"), std::string::npos) << result.err;
     EXPECT_TRUE(fs::is_empty(folder.path / "place")) << "nothing half-written stays";
     // Under nohup it goes on.
-    result = run_command({"/bin/sh", "-c", "trap '' HUP; \"$@\" & sleep 0.3; kill -HUP $!; wait $!", "sh",
-                          SLABWRIGHT_COMMAND, "plan", kData + "pump-cover.stl", "-o", folder / "place/out"});
+    result =
+        run_command({"/bin/sh", "-c", "trap '' HUP; \"$@\" & sleep 0.3; kill -HUP $!; wait $!", "sh",
+                     support::built_command(), "plan", kData + "pump-cover.stl", "-o", folder / "place/out"});
     EXPECT_EQ(result.exit, 0) << result.err;
     EXPECT_NE(result.out.find("layers"), std::string::npos) << result.err;
 }

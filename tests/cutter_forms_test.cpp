@@ -20,6 +20,7 @@
 #include "nlohmann/json.hpp"
 #include "tests/mesh_shapes.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
 
@@ -209,16 +210,15 @@ TEST(CutterForms, FollowWiderBallsIntoNarrowPlaces) {
 TEST(CutterForms, PlansWithALibraryOfEveryFormAreProven) {
     const TemporaryFolder folder;
     Context context;
-    const std::string out = folder / "plan", stl = SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl";
+    const std::string out = folder / "plan", stl = support::checkout("tests/data/pump-cover.stl");
     Job job;
     job.tools = forms_library();
     job.selection.mode = SelectionMode::fixed;
     job.cutting.edges = true;
     job.tools[2].holder_profile = {20, 32, 32, 20, 32, 60};
     write(context, plan(context, stl, job), out);
-    EXPECT_EQ(
-        support::schema_complaint(slurp(out + "/plan.json"), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
-        "");
+    EXPECT_EQ(support::schema_complaint(slurp(out + "/plan.json"), support::checkout("io/plan.schema.json")),
+              "");
     const VerifyResult result = verify(context, out, stl, {}, 1);
     for (const Diagnostic& d : result.violations) ADD_FAILURE() << d.code << ' ' << d.message;
     const json planned = json::parse(slurp(out + "/plan.json"));

@@ -15,6 +15,7 @@
 #include "io/write/job_toml.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
 
@@ -23,7 +24,7 @@ namespace {
 
 using nlohmann::json;
 
-const std::string kData = SLABWRIGHT_SOURCE_DIR "/tests/data/";
+const std::string kData = support::checkout("tests/data/");
 
 std::string tool_text(int number, const char* kind, double diameter, const std::string& more = "") {
     return "[[tool]]\nnumber = " + std::to_string(number) + "\nkind = \"" + kind +
@@ -161,7 +162,7 @@ TEST(CuttingData, APlanSaysWhoseFeedsItHasAndIsProven) {
         tool_text(2, "flat", 12) + kBall;
     write(context, plan(context, stl, parse_job(text, "x")), out);
     const std::string written = support::slurp(out + "/plan.json");
-    EXPECT_EQ(support::schema_complaint(written, SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"), "");
+    EXPECT_EQ(support::schema_complaint(written, support::checkout("io/plan.schema.json")), "");
     const json document = json::parse(written);
     ASSERT_EQ(document["cutting_data"].size(), 1u);
     EXPECT_EQ(document["cutting_data"][0]["source"], "test cut of May");

@@ -16,6 +16,7 @@
 #include "io/slabwright.h"
 #include "tests/data/models.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/rs274.h"
 #include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
@@ -115,7 +116,7 @@ TEST(DowelPlans, ArePlannedProvenAndTold) {
     EXPECT_TRUE(proof["violations"].empty()) << proof["violations"].dump(1);
     for (const char* name : {"plan", "sequence"})
         EXPECT_EQ(support::schema_complaint(slurp(fmt::format("{}/{}.json", built.out, name)),
-                                            fmt::format("{}/io/{}.schema.json", SLABWRIGHT_SOURCE_DIR, name)),
+                                            support::checkout(fmt::format("io/{}.schema.json", name))),
                   "");
     const json sequence = json::parse(slurp(built.out + "/sequence.json"));
     std::istringstream list(slurp(built.out + "/dowels.csv"));

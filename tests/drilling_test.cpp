@@ -20,6 +20,7 @@
 #include "tests/support/command.h"
 #include "tests/support/drilled_plate.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/seed.h"
 
 namespace slabwright {
@@ -33,7 +34,7 @@ using test::LoopAxis;
 constexpr double kPi = std::numbers::pi, kPoint = 59 * kPi / 180;
 
 CommandResult run(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
+    arguments.insert(arguments.begin(), support::built_command());
     return support::run_command(arguments);
 }
 

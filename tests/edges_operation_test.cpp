@@ -15,6 +15,7 @@
 #include "tests/support/edge_error.h"
 #include "tests/support/files.h"
 #include "tests/support/height_field.h"
+#include "tests/support/places.h"
 #include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
 
@@ -67,7 +68,7 @@ TEST(EdgesOperation, LeavesLessAlongRidgesAndIsProven) {
         const std::string out = folder / (edges ? "with" : "without");
         write(context, made, out);
         EXPECT_EQ(support::schema_complaint(support::slurp(out + "/plan.json"),
-                                            SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
+                                            support::checkout("io/plan.schema.json")),
                   "");
         for (const Diagnostic& v : verify(context, out, stl, {}, 1).violations)
             ADD_FAILURE() << v.code << ' ' << v.message;

@@ -18,15 +18,14 @@
 #include "kernels/slicing/silhouette.h"
 #include "tests/data/models.h"
 #include "tests/support/height_field.h"
+#include "tests/support/places.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
 namespace {
 
-std::string model(const char* name) {
-    return std::string(SLABWRIGHT_SOURCE_DIR "/tests/data/") + name + ".stl";
-}
+std::string model(const char* name) { return support::checkout("tests/data/") + name + ".stl"; }
 
 Job with_flask() {
     Job job;

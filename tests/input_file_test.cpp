@@ -13,6 +13,7 @@
 #include "kernels/errors.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
@@ -25,11 +26,11 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const std::string kStl = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+const std::string kStl = support::checkout("tests/data/half-sphere.stl");
 
 /// The command, ended by force (exit 137) where it does not come back by itself.
 CommandResult bounded_command(const std::vector<std::string>& arguments) {
-    std::vector<std::string> all = {"/usr/bin/timeout", "-s", "KILL", "120", SLABWRIGHT_COMMAND};
+    std::vector<std::string> all = {"/usr/bin/timeout", "-s", "KILL", "120", support::built_command()};
     all.insert(all.end(), arguments.begin(), arguments.end());
     return run_command(all);
 }

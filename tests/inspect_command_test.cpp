@@ -11,6 +11,7 @@
 #include "tests/mesh_shapes.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tunnels.h"
@@ -22,11 +23,11 @@ using slabwright::support::TemporaryFolder;
 
 namespace {
 
-const std::string kData = SLABWRIGHT_SOURCE_DIR "/tests/data/";
-const std::string kSchema = SLABWRIGHT_SOURCE_DIR "/io/inspect.schema.json";
+const std::string kData = slabwright::support::checkout("tests/data/");
+const std::string kSchema = slabwright::support::checkout("io/inspect.schema.json");
 
 CommandResult slabwright_command(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
+    arguments.insert(arguments.begin(), slabwright::support::built_command());
     return slabwright::support::run_command(arguments);
 }
 

@@ -30,6 +30,7 @@
 #include "kernels/mesh/facet_roles.h"
 #include "kernels/mesh/weld.h"
 #include "tests/mesh_shapes.h"
+#include "tests/support/places.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
@@ -629,8 +630,7 @@ TEST(Joints, OwnModelsHaveWoodWhereverGlueGoes) {
     for (const char* name : {"pump-cover", "half-sphere", "luo-tool-sample", "luo-layer-sample"}) {
         SCOPED_TRACE(name);
         Context context;
-        const Mesh mesh =
-            read_mesh(context, std::string(SLABWRIGHT_SOURCE_DIR "/tests/data/") + name + ".stl");
+        const Mesh mesh = read_mesh(context, support::checkout("tests/data/") + name + ".stl");
         for (const bool bonded : {false, true}) {
             const Plan plan = layers_of(context, mesh.view(), {}, bonded);
             expect_wood_at_joints(context, mesh.view(), plan);

@@ -23,6 +23,7 @@
 #include "kernels/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/height_field.h"
+#include "tests/support/places.h"
 #include "tests/support/schema.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
@@ -440,7 +441,7 @@ TEST(KeepOuts, APlanBesideABoltVerifiesAndPassesOverIt) {
     const VerifyResult result = write_block(context, job_with_bolt(150, 40, 55), folder);
     EXPECT_TRUE(result.passed) << result.violations.size();
     EXPECT_EQ(support::schema_complaint(support::slurp(folder / "out/plan.json"),
-                                        SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
+                                        support::checkout("io/plan.schema.json")),
               "");
     // All programs begin and end over the bolt, whose top lies 55 mm over the board.
     const Verification found = verify_folder(context, folder / "out", {.source = {}, .write = false});

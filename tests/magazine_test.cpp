@@ -22,6 +22,7 @@
 #include "kernels/errors.h"
 #include "tests/support/block_build.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/schema.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
@@ -296,17 +297,17 @@ TEST(Magazine, PocketsOfTheToolTableArePlaces) {
 
 TEST(Magazine, AFolderProvesItself) {
     const support::TemporaryFolder folder;
-    const std::string out = folder / "out", pattern = SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl";
+    const std::string out = folder / "out", pattern = support::checkout("tests/data/pump-cover.stl");
     Context context;
     const Job job = job_from_toml("[machine]\nmagazine = 2\n", "job");
     const Plan made = plan(context, PatternSource(pattern), job);
     EXPECT_GT(made.totals.magazine_swaps, 0);
     write(context, made, out, PatternSource(pattern));
     EXPECT_EQ(support::schema_complaint(support::slurp(out + "/sequence.json"),
-                                        SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"),
+                                        support::checkout("io/sequence.schema.json")),
               "");
     EXPECT_EQ(support::schema_complaint(support::slurp(out + "/plan.json"),
-                                        SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
+                                        support::checkout("io/plan.schema.json")),
               "");
     const VerifyResult verified = verify(context, out, PatternSource(pattern));
     EXPECT_TRUE(verified.passed) << (verified.violations.empty() ? "" : verified.violations[0].message);

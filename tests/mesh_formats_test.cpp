@@ -19,6 +19,7 @@
 #include "kernels/errors.h"
 #include "tests/support/closed_mesh.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
@@ -468,7 +469,7 @@ TEST(MeshFormats, AThousandDamagedFilesOfEachEndInAClearErrorOrAMesh) {
     Context context({.threads = 1, .memory_bytes = std::uint64_t{1} << 30});
     std::vector<Named> files = all_formats(block_with_boss());
     if (is_built("STEP"))
-        files.push_back({"h.step", support::slurp(SLABWRIGHT_SOURCE_DIR "/tests/data/flange.step")});
+        files.push_back({"h.step", support::slurp(support::checkout("tests/data/flange.step"))});
     std::mt19937_64 random(test::seed());
     for (const Named& file : files) {
         // OCCT takes 30 ms a file.
@@ -500,7 +501,7 @@ TEST(MeshFormats, AThousandDamagedFilesOfEachEndInAClearErrorOrAMesh) {
 TEST(MeshFormats, StepIsTessellatedWithinItsDeviationInAnyUnit) {
     if (!is_built("STEP")) GTEST_SKIP() << "STEP was not built";
     Context context;
-    const std::string folder = SLABWRIGHT_SOURCE_DIR "/tests/data/";
+    const std::string folder = support::checkout("tests/data/");
     for (const char* name : {"flange.step", "flange-inch.step"}) {
         const PatternMesh found = read_pattern_mesh(context, folder + name);
         EXPECT_EQ(found.report.open_edges.count, 0u) << name;

@@ -15,6 +15,7 @@
 
 #include "tests/data/luo_layer_sample.h"
 #include "tests/data/models.h"
+#include "tests/support/places.h"
 
 namespace slabwright {
 namespace {
@@ -112,7 +113,7 @@ std::string bytes_of(const std::string& path) {
 }
 
 void expect_committed(const std::string& name, const std::vector<Facet>& facets) {
-    const std::string path = std::string(SLABWRIGHT_SOURCE_DIR) + "/tests/data/" + name + ".stl";
+    const std::string path = support::checkout("tests/data/") + name + ".stl";
     EXPECT_TRUE(bytes_of(path) == stl_bytes(name, facets))
         << path << " differs: run `make_models all tests/data` and look at what changed";
 }

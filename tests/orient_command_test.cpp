@@ -6,6 +6,7 @@
 
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/temporary_folder.h"
 
 using nlohmann::json;
@@ -14,10 +15,10 @@ using slabwright::support::TemporaryFolder;
 
 namespace {
 
-const std::string kDome = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+const std::string kDome = slabwright::support::checkout("tests/data/half-sphere.stl");
 
 CommandResult slabwright_command(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
+    arguments.insert(arguments.begin(), slabwright::support::built_command());
     return slabwright::support::run_command(arguments);
 }
 

@@ -18,6 +18,7 @@
 #include "kernels/errors.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
@@ -31,7 +32,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const std::string kStl = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+const std::string kStl = support::checkout("tests/data/half-sphere.stl");
 
 /// A plan folder with two programs, as far as a replacement looks at it.
 void write_plan_folder(const fs::path& out) {
@@ -58,7 +59,7 @@ std::string refusal(const fs::path& out) {
 }
 
 CommandResult slabwright_command(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
+    arguments.insert(arguments.begin(), support::built_command());
     return run_command(arguments);
 }
 
@@ -251,7 +252,7 @@ TEST(OutputFolder, VerifyAndReportTouchNothingElse) {
     // A full disk, played by a limit on the length of files: what was there stays, and nothing beside it.
     const auto before = tree(out);
     const CommandResult full = run_command({"/bin/sh", "-c", "trap '' XFSZ; ulimit -f 1; exec \"$@\"", "sh",
-                                            SLABWRIGHT_COMMAND, "verify", out, "--stl", kStl});
+                                            support::built_command(), "verify", out, "--stl", kStl});
     EXPECT_EQ(full.exit, 3) << full.out << full.err;
     EXPECT_NE(full.err.find("verify.json"), std::string::npos) << full.err;
     EXPECT_EQ(tree(out), before);
@@ -262,7 +263,8 @@ TEST(OutputFolder, VerifyAndReportTouchNothingElse) {
 TEST(OutputFolder, AKilledPlanIsClearedAwayByTheNext) {
     TemporaryFolder folder;
     const std::string out = folder / "out";
-    const std::vector<std::string> arguments = {SLABWRIGHT_COMMAND, "plan", kStl, "-o", out, "--no-verify"};
+    const std::vector<std::string> arguments = {
+        support::built_command(), "plan", kStl, "-o", out, "--no-verify"};
     bool caught = false;
     for (int attempt = 0; attempt < 20 && !caught; ++attempt) {
         const pid_t child = ::fork();

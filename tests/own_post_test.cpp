@@ -26,6 +26,7 @@
 #include "io/verify.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/schema.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
@@ -41,7 +42,7 @@ namespace {
 constexpr Post kBases[] = {Post::linuxcnc, Post::fanuc, Post::haas,   Post::grbl,
                            Post::mach,     Post::iso,   Post::siemens};
 constexpr LengthUnit kUnits[] = {LengthUnit::mm, LengthUnit::inch};
-const std::string kModel = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+const std::string kModel = support::checkout("tests/data/half-sphere.stl");
 
 /// A shop's router: numbered lines, all decimals, arcs by radius, dust switched by M10 and M11.
 const std::string kRouter = R"toml(base = "fanuc"
@@ -297,7 +298,7 @@ TEST(OwnPost, DamagedPostsAreRefusedClearlyOrWriteWhatIsMeant) {
 }
 
 TEST(OwnPost, TheExampleOfTheFormatsPageIsTaken) {
-    const std::string page = slurp(SLABWRIGHT_SOURCE_DIR "/io/FORMATS.md");
+    const std::string page = slurp(support::checkout("io/FORMATS.md"));
     const std::size_t begin = page.find("```toml\nbase = ");
     ASSERT_NE(begin, std::string::npos);
     EXPECT_EQ(message(page.substr(begin + 8, page.find("\n```", begin + 8) - begin - 8)), "");
@@ -335,7 +336,7 @@ TEST(OwnPost, PlansProvesAndVerifiesFromItsFolderAlone) {
             EXPECT_EQ(slurp(out + "/post.toml"), kRouter);
             EXPECT_FALSE(std::filesystem::exists(out + "/tool.tbl"));
             const std::string text = slurp(out + "/plan.json");
-            EXPECT_EQ(schema_complaint(text, SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"), "");
+            EXPECT_EQ(schema_complaint(text, support::checkout("io/plan.schema.json")), "");
             const auto document = nlohmann::json::parse(text);
             EXPECT_EQ(document["job"]["machine"]["post"], "post.toml");
             EXPECT_EQ(document["post"]["name"], "Router 3");

@@ -30,6 +30,7 @@
 #include "kernels/errors.h"
 #include "tests/support/comma_locale.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/schema.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
@@ -192,16 +193,15 @@ TEST(PlanJson, KeepsItsSchema) {
         Plan plan = hand_made();
         plan.job.machine.frame = frame;
         schedule(plan);
-        EXPECT_EQ(schema_complaint(plan_json(plan), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"), "");
-        EXPECT_EQ(schema_complaint(sequence_json(plan), SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"),
-                  "");
+        EXPECT_EQ(schema_complaint(plan_json(plan), support::checkout("io/plan.schema.json")), "");
+        EXPECT_EQ(schema_complaint(sequence_json(plan), support::checkout("io/sequence.schema.json")), "");
     }
     Plan plan = hand_made();
     schedule(plan);
     for (const char* how : {"none", "mend", "rebuild"}) {
         plan.input.repair = InputRepair{how, {}, .02, .25, .1, .05, 1000};
         plan.input.repair->defects = {{"crack", 12, .03, "mm", {1, 2, 3}}, {"degenerate", 1, 0, "", {}}};
-        EXPECT_EQ(schema_complaint(plan_json(plan), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"), "");
+        EXPECT_EQ(schema_complaint(plan_json(plan), support::checkout("io/plan.schema.json")), "");
         EXPECT_EQ(json::parse(plan_json(plan))["input"]["repair"]["defects"][0]["count"], 12);
     }
 }
@@ -212,7 +212,7 @@ TEST(PlanJson, SchemaRefusesWhatBreaksTheContract) {
     const auto refused = [&](const std::function<void(json&)>& change) {
         json broken = good;
         change(broken);
-        return schema_complaint(broken.dump(), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json") != "";
+        return schema_complaint(broken.dump(), support::checkout("io/plan.schema.json")) != "";
     };
     EXPECT_TRUE(refused([](json& j) { j["layers"][0]["operations"][0].erase("peak_force_n"); }));
     EXPECT_TRUE(refused([](json& j) { j["layers"][0]["operations"][0]["kind"] = "polish"; }));
@@ -222,7 +222,7 @@ TEST(PlanJson, SchemaRefusesWhatBreaksTheContract) {
     EXPECT_TRUE(refused([](json& j) { j["diagnostics"][0].erase("where"); }));
     json sequence = json::parse(sequence_json(hand_made()));
     sequence["steps"][2].erase("needs");
-    EXPECT_NE(schema_complaint(sequence.dump(), SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"), "");
+    EXPECT_NE(schema_complaint(sequence.dump(), support::checkout("io/sequence.schema.json")), "");
 }
 
 TEST(PlanJson, SaysWhatThePlanHolds) {
@@ -268,7 +268,7 @@ TEST(PlanJson, SaysWhatStaysOfTheSlabs) {
     };
     plan.flask = Flask{square(1000001), {square(500000), square(510000)}, 24.5, 2e6, 1e6};
     const std::string text = plan_json(plan);
-    EXPECT_EQ(schema_complaint(text, SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"), "");
+    EXPECT_EQ(schema_complaint(text, support::checkout("io/plan.schema.json")), "");
     const json flask = json::parse(text)["flask"];
     EXPECT_EQ(flask["outer"][0], json::array({-100.0001, -100.0001}));
     EXPECT_EQ(flask["inner"], flask["inner_by_layer"][0]);

@@ -16,6 +16,7 @@
 #include "tests/support/files.h"
 #include "tests/support/height_field.h"
 #include "tests/support/loft.h"
+#include "tests/support/places.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -303,7 +304,7 @@ TEST(Planner, NoProgramTouchesTheOwnModels) {
         Context context;
         Job job;
         job.allow_undercut = true;
-        const std::string stl = std::string(SLABWRIGHT_SOURCE_DIR "/tests/data/") + name + ".stl";
+        const std::string stl = support::checkout("tests/data/") + name + ".stl";
         const support::TemporaryFolder folder;
         const std::string out = folder / "out";
         write(context, plan(context, stl, job), out);
@@ -322,7 +323,7 @@ TEST(Planner, ProgressIsToldAllTheWay) {
     std::vector<std::pair<std::string, double>> told;
     Context context({.progress = [&](const Progress& p) { told.emplace_back(p.phase, p.fraction); }});
     context.share_progress(0, kPlanningShare);
-    const std::string stl = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+    const std::string stl = support::checkout("tests/data/half-sphere.stl");
     const Plan result = plan(context, stl, Job{});
     ASSERT_FALSE(told.empty());
     EXPECT_LE(told.back().second, kPlanningShare + 1e-9);
@@ -344,7 +345,7 @@ TEST(Planner, ProgressIsToldAllTheWay) {
 // Read once for both, or for each: the same plan and the same findings.
 TEST(Planner, APatternIsReadOnceForPlanAndVerification) {
     Context context;
-    const std::string stl = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+    const std::string stl = support::checkout("tests/data/half-sphere.stl");
     const support::TemporaryFolder folder;
     const Job job;
     (void)write_verified(context, plan(context, stl, job), folder / "twice", stl);
@@ -365,7 +366,7 @@ TEST(Planner, APatternIsReadOnceForPlanAndVerification) {
     } catch (const Error& error) {
         EXPECT_EQ(error.kind(), ErrorKind::usage) << error.what();
     }
-    const auto other = read_pattern(context, SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl", job);
+    const auto other = read_pattern(context, support::checkout("tests/data/pump-cover.stl"), job);
     try {
         (void)write_verified(context, planned, folder / "other", other);
         FAIL() << "verified against another pattern than was planned";
@@ -376,7 +377,7 @@ TEST(Planner, APatternIsReadOnceForPlanAndVerification) {
 
 TEST(Planner, TotalsHoldThePartsVolume) {
     Context context;
-    const Plan result = plan(context, SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl", Job{});
+    const Plan result = plan(context, support::checkout("tests/data/half-sphere.stl"), Job{});
     const double whole = 2.0 / 3.0 * std::numbers::pi * 50 * 50 * 50;
     EXPECT_NEAR(result.totals.part_volume_mm3, whole, 0.002 * whole);
     EXPECT_LT(result.totals.part_volume_mm3, result.totals.stock_volume_mm3);
@@ -385,7 +386,7 @@ TEST(Planner, TotalsHoldThePartsVolume) {
 // The pump cover is made as planned: nothing above the cusp stays where a tool reaches.
 TEST(Planner, ThePumpCoverVerifies) {
     Context context;
-    const std::string stl = SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl";
+    const std::string stl = support::checkout("tests/data/pump-cover.stl");
     const support::TemporaryFolder folder;
     write(context, plan(context, stl, Job{}), folder / "out");
     const VerifyResult result = verify(context, folder / "out", stl);
@@ -395,7 +396,7 @@ TEST(Planner, ThePumpCoverVerifies) {
 // A slow z and y: no feed asks them for more, which verify() would refuse, and it takes longer.
 TEST(Planner, FeedsKeepToTheAxes) {
     Context context;
-    const std::string stl = SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl";
+    const std::string stl = support::checkout("tests/data/pump-cover.stl");
     Job job;
     const double minutes = plan(context, stl, job).totals.cutting_minutes;
     job.machine.rapid_y = 6000, job.machine.rapid_z = 900;

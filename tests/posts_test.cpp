@@ -33,6 +33,7 @@
 #include "tests/support/every_control.h"
 #include "tests/support/files.h"
 #include "tests/support/grbl_toolpath.h"
+#include "tests/support/places.h"
 #include "tests/support/rs274.h"
 #include "tests/support/schema.h"
 #include "tests/support/seed.h"
@@ -416,10 +417,9 @@ TEST(Posts, ALayerIsMadeAgainInEachDialect) {
         job.slabs.blanks = Blanks::layer;
         const Plan made = plan(context, PatternSource(kModels + "half-sphere.stl"), job);
         write(context, made, out);
-        EXPECT_EQ(schema_complaint(slurp(out + "/plan.json"), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
-                  "");
+        EXPECT_EQ(schema_complaint(slurp(out + "/plan.json"), support::checkout("io/plan.schema.json")), "");
         EXPECT_EQ(
-            schema_complaint(slurp(out + "/sequence.json"), SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"),
+            schema_complaint(slurp(out + "/sequence.json"), support::checkout("io/sequence.schema.json")),
             "");
         int after = 0;  // into layer 2
         for (const SequenceStep& step : made.sequence)
@@ -428,7 +428,7 @@ TEST(Posts, ALayerIsMadeAgainInEachDialect) {
         ASSERT_EQ(status.programs.size(), 2u) << name_of(post, LengthUnit::mm);
         EXPECT_EQ(status.programs[0], "resume_001/nc/" + program_file(post, "F001_L002_face_off_T1"));
         EXPECT_EQ(schema_complaint(slurp(out + "/resume_001/sequence.json"),
-                                   SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"),
+                                   support::checkout("io/sequence.schema.json")),
                   "");
         // What has not run yet is read and proven again each time.
         (void)resume_build(context, out, {{}, {}, 1'795'617'790});

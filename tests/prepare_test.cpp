@@ -23,6 +23,7 @@
 #include "tests/mesh_shapes.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
@@ -33,12 +34,12 @@ using shapes::Facets;
 using support::slurp;
 using support::TemporaryFolder;
 
-const std::string kSphere = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
-const std::string kCover = SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl";
+const std::string kSphere = support::checkout("tests/data/half-sphere.stl");
+const std::string kCover = support::checkout("tests/data/pump-cover.stl");
 
 /// The command with these words.
 support::CommandResult run(const std::string& line) {
-    std::vector<std::string> arguments{SLABWRIGHT_COMMAND};
+    std::vector<std::string> arguments{support::built_command()};
     std::istringstream words(line);
     for (std::string word; words >> word;) arguments.push_back(word);
     return support::run_command(arguments);

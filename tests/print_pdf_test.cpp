@@ -7,6 +7,7 @@
 #include "io/slabwright.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
@@ -18,7 +19,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const std::string kStl = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+const std::string kStl = support::checkout("tests/data/half-sphere.stl");
 
 /// An executable of a few lines.
 std::string script(const TemporaryFolder& folder, const std::string& name, const std::string& lines) {
@@ -30,8 +31,8 @@ std::string script(const TemporaryFolder& folder, const std::string& name, const
 
 CommandResult print(const std::string& out, const std::string& pdf,
                     std::vector<std::pair<std::string, std::string>> environment) {
-    return support::run_command({SLABWRIGHT_COMMAND, "report", out, "--no-3d", "--stl", kStl, "--pdf", pdf},
-                                environment);
+    return support::run_command(
+        {support::built_command(), "report", out, "--no-3d", "--stl", kStl, "--pdf", pdf}, environment);
 }
 
 }  // namespace

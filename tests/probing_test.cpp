@@ -23,6 +23,7 @@
 #include "io/verify.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/rs274.h"
 #include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
@@ -35,7 +36,7 @@ using slabwright::support::TemporaryFolder;
 
 namespace {
 
-const std::string kSphere = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+const std::string kSphere = support::checkout("tests/data/half-sphere.stl");
 constexpr const char* kOnTable =
     "[probing]\nplate = 2.0\nreference = [-40.0, 25.0, 10.0]\n[machine]\ntable = \"fixed\"\nprobe = "
     "\"cycle\"\n";
@@ -110,9 +111,8 @@ TEST(ZeroInZ, ProgramsCountFromTheMachinesTable) {
             EXPECT_NEAR(quantity(step, "table_height_mm"), quantity(step, "work_offset_z_mm"), 1e-6);
         EXPECT_NE(slurp(on_table + "/nc/" + planned.layers[0].operations[0].file).find("machine table's top"),
                   std::string::npos);
-        EXPECT_EQ(
-            schema_complaint(slurp(on_table + "/plan.json"), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
-            "");
+        EXPECT_EQ(schema_complaint(slurp(on_table + "/plan.json"), support::checkout("io/plan.schema.json")),
+                  "");
         // Programs that are read from another height do not make the part.
         auto document = nlohmann::json::parse(slurp(on_table + "/plan.json"));
         document["job"]["machine"]["base_board_thickness"] = 22.5;
@@ -139,7 +139,7 @@ TEST(ZeroAtAPin, ProgramsCountFromIt) {
     const auto document = nlohmann::json::parse(slurp(out + "/plan.json"));
     EXPECT_NEAR(document["zero"][0].get<double>(), planned.stock_min[0] - 12.5, 1e-4);
     EXPECT_NEAR(document["zero"][1].get<double>(), planned.stock_min[1] + 30, 1e-4);
-    EXPECT_EQ(schema_complaint(slurp(out + "/plan.json"), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"), "");
+    EXPECT_EQ(schema_complaint(slurp(out + "/plan.json"), support::checkout("io/plan.schema.json")), "");
     const auto touched = steps_of(out, "touch_off");
     EXPECT_NEAR(quantity(touched.at(0), "slab_left_mm"), 12.5, 1e-3);
     EXPECT_NEAR(quantity(touched.at(0), "slab_front_mm"), -30, 1e-3);
@@ -186,12 +186,11 @@ TEST(Probing, TheReferenceIsProbedInEachLayer) {
                 EXPECT_NEAR(quantity(probed[l], "start_z_mm"), quantity(probed[l], "touch_z_mm") + 10, 1e-6);
                 EXPECT_EQ(probed[l]["program"], fmt::format("nc/L{:03}_00_probe_T99.ngc", l + 1));
             }
-            EXPECT_EQ(
-                schema_complaint(slurp(out + "/plan.json"), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
-                "");
-            EXPECT_EQ(schema_complaint(slurp(out + "/sequence.json"),
-                                       SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"),
+            EXPECT_EQ(schema_complaint(slurp(out + "/plan.json"), support::checkout("io/plan.schema.json")),
                       "");
+            EXPECT_EQ(
+                schema_complaint(slurp(out + "/sequence.json"), support::checkout("io/sequence.schema.json")),
+                "");
             // The folder is ours, with its probing programs.
             Context context;
             write(context, planned, out);
@@ -223,9 +222,8 @@ TEST(Probing, EachTipIsProbedOnTheReferenceWhereTheControlKeepsNoLengths) {
     }
     EXPECT_EQ(static_cast<std::size_t>(probes), planned.probes.size());
     EXPECT_GE(static_cast<std::size_t>(probes), 2 * planned.layers.size());
-    EXPECT_EQ(
-        schema_complaint(slurp(out + "/sequence.json"), SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"),
-        "");
+    EXPECT_EQ(schema_complaint(slurp(out + "/sequence.json"), support::checkout("io/sequence.schema.json")),
+              "");
 }
 
 TEST(Probing, LinuxCncsInterpreterFindsZeroWhereThePlanSays) {
@@ -438,7 +436,7 @@ TEST(Probing, ABuildUnderWayIsResumedAndALayerMadeAgain) {
         (void)resume_build(context, out, {after, {}, 1'795'617'730});
         (void)resume_build(context, out, {{}, 2, 1'795'617'790});
         EXPECT_EQ(schema_complaint(slurp(out + "/resume_001/sequence.json"),
-                                   SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"),
+                                   support::checkout("io/sequence.schema.json")),
                   "");
         // Layer 2 is probed again, after it has been laid anew.
         const auto probed = steps_of(out + "/resume_001", "probe");

@@ -21,6 +21,7 @@
 #include "tests/mesh_shapes.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -207,7 +208,7 @@ TEST(RepairInput, TheCommandRefusesMendsAndTells) {
     const TemporaryFolder folder;
     save(folder / "cracked.stl", cracked());
     const auto run = [](std::vector<std::string> arguments) {
-        arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
+        arguments.insert(arguments.begin(), support::built_command());
         return support::run_command(arguments);
     };
     const auto refused = run({"plan", folder / "cracked.stl", "-o", folder / "out"});

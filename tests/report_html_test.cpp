@@ -16,6 +16,7 @@
 #include "io/write/thinned_path.h"
 #include "kernels/access/standing_part.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -27,7 +28,7 @@ using support::slurp;
 using support::spit;
 using support::TemporaryFolder;
 
-const std::string kStl = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+const std::string kStl = support::checkout("tests/data/half-sphere.stl");
 
 json data_of(const std::string& page) {
     const std::string begin = "id=\"slabwright-data\">";
@@ -256,7 +257,7 @@ TEST(Report, RefusesWhatItCannotUnderstand) {
     spit(plan_file, broken.dump());
     EXPECT_EQ(code(), "report.plan");
     spit(plan_file, text);
-    EXPECT_EQ(code({SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl"}), "report.other_pattern");
+    EXPECT_EQ(code({support::checkout("tests/data/pump-cover.stl")}), "report.other_pattern");
     EXPECT_EQ(code({folder / "missing.stl"}), "stl.missing");
     EXPECT_EQ(code({kStl, true, 0.2}), "report.size_limit");
     EXPECT_EQ(code({kStl, true, -1}), "report.size_limit");

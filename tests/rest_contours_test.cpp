@@ -20,6 +20,7 @@
 #include "tests/data/models.h"
 #include "tests/support/end_mill_job.h"
 #include "tests/support/height_field.h"
+#include "tests/support/places.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
@@ -320,7 +321,7 @@ TEST(RestContours, AWiderSwathLeavesLessToSemiRoughing) {
 TEST(RestContours, LuosSampleIsFasterOnContoursAndVerifies) {
     Context context;
     const Mesh mesh = weld(context, luo_tool_sample());
-    const std::string stl = SLABWRIGHT_SOURCE_DIR "/tests/data/luo-tool-sample.stl";
+    const std::string stl = support::checkout("tests/data/luo-tool-sample.stl");
     for (const bool all : {false, true}) {
         Job job;
         if (all) job.tools = luo_library();

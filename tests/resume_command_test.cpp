@@ -19,6 +19,7 @@
 #include "kernels/stock/stock.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/schema.h"
 #include "tests/support/temporary_folder.h"
 
@@ -34,8 +35,8 @@ using support::spit;
 using support::TemporaryFolder;
 using support::tree;
 
-const std::string command = SLABWRIGHT_COMMAND;
-const std::string pump_cover = SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl";
+const std::string command = support::built_command();
+const std::string pump_cover = support::checkout("tests/data/pump-cover.stl");
 constexpr std::int64_t kNow = 1'795'617'730;
 
 /// Plans the pump cover, unproven, into a folder.
@@ -131,7 +132,7 @@ TEST(ResumeFolder, KilledAfterAnyStepItGoesOnFromDiskAndEndsTheSame) {
             ASSERT_EQ(end, whole.state) << k;
         }
         EXPECT_EQ(
-            schema_complaint(slurp(out + "/progress.json"), SLABWRIGHT_SOURCE_DIR "/io/progress.schema.json"),
+            schema_complaint(slurp(out + "/progress.json"), support::checkout("io/progress.schema.json")),
             "");
         EXPECT_NEAR(resume_build(context, out, {0, {}, kNow}).minutes_left,
                     json::parse(slurp(out + "/plan.json"))["totals"]["build_minutes"].get<double>(), 0.1);
@@ -169,9 +170,9 @@ TEST(ResumeFolder, EveryLayerIsMadeAgainAndTheWoodEndsTheSame) {
             EXPECT_EQ(made.programs.size(), static_cast<std::size_t>(on_top - layer + 1));
             const std::string text = slurp(out + "/resume_001/sequence.json");
             if (layer == 1) {
-                EXPECT_EQ(schema_complaint(text, SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"), "");
+                EXPECT_EQ(schema_complaint(text, support::checkout("io/sequence.schema.json")), "");
                 EXPECT_EQ(schema_complaint(slurp(out + "/progress.json"),
-                                           SLABWRIGHT_SOURCE_DIR "/io/progress.schema.json"),
+                                           support::checkout("io/progress.schema.json")),
                           "");
             }
             const BuildSequence again = read_sequence(text);

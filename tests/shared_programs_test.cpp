@@ -29,6 +29,7 @@
 #include "tests/support/block_build.h"
 #include "tests/support/every_control.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/rs274.h"
 #include "tests/support/schema.h"
 #include "tests/support/seed.h"
@@ -424,7 +425,7 @@ TEST(SharedPrograms, AFolderProvesItself) {
             }
             for (const char* name : {"plan", "sequence"})
                 EXPECT_EQ(schema_complaint(slurp(out + "/" + name + ".json"),
-                                           fmt::format("{}/io/{}.schema.json", SLABWRIGHT_SOURCE_DIR, name)),
+                                           support::checkout(fmt::format("io/{}.schema.json", name))),
                           "");
             // Interrupted in layer 2, its first program done, it is made again.
             int after = 0;
@@ -434,7 +435,7 @@ TEST(SharedPrograms, AFolderProvesItself) {
             const ResumeStatus status = resume_build(context, out, {after, 1, 1'795'617'730});
             EXPECT_EQ(status.programs.size(), 2u);
             EXPECT_EQ(schema_complaint(slurp(out + "/resume_001/sequence.json"),
-                                       SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"),
+                                       support::checkout("io/sequence.schema.json")),
                       "");
             (void)resume_build(context, out, {{}, {}, 1'795'617'790});
             // Two operations exchanged within a program are told.

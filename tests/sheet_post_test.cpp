@@ -8,6 +8,7 @@
 #include "kernels/errors.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -16,8 +17,8 @@ namespace {
 using support::run_command;
 using support::TemporaryFolder;
 
-const std::string command = SLABWRIGHT_COMMAND;
-const std::string half_sphere = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+const std::string command = support::built_command();
+const std::string half_sphere = support::checkout("tests/data/half-sphere.stl");
 
 TEST(SheetPost, SaysWhatEachHeadHas) {
     const SheetPost post = parse_sheet_post(

@@ -9,6 +9,7 @@
 
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/rs274.h"
 #include "tests/support/temporary_folder.h"
 
@@ -19,8 +20,8 @@ using support::CommandResult;
 using support::run_command;
 using support::TemporaryFolder;
 
-const std::string command = SLABWRIGHT_COMMAND;
-const std::string half_sphere = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+const std::string command = support::built_command();
+const std::string half_sphere = support::checkout("tests/data/half-sphere.stl");
 
 CommandResult sheets(const std::string& out, std::vector<std::string> more = {}) {
     std::vector<std::string> arguments{command, "sheets", half_sphere, "-o", out, "--stock", "400", "400"};

@@ -18,6 +18,7 @@
 #include "kernels/repair/repair.h"
 #include "tests/mesh_shapes.h"
 #include "tests/support/command.h"
+#include "tests/support/places.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
@@ -35,7 +36,7 @@ Point3 back(const AffineMap& map, const Point3& p) {
 }
 
 support::CommandResult run_line(const std::string& line) {
-    std::vector<std::string> arguments{SLABWRIGHT_COMMAND};
+    std::vector<std::string> arguments{support::built_command()};
     std::istringstream words(line);
     for (std::string word; words >> word;) arguments.push_back(word);
     return support::run_command(arguments);

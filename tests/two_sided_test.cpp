@@ -26,6 +26,7 @@
 #include "kernels/slicing/slicing.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/schema.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
@@ -135,7 +136,7 @@ TEST_F(TwoSided, DocumentsKeepToTheirSchemas) {
     for (std::string folder : {built_->out, built_->undersides.at(0)}) {
         for (const std::string name : {"plan", "sequence"})
             EXPECT_EQ(support::schema_complaint(slurp(folder + "/" + name + ".json"),
-                                                SLABWRIGHT_SOURCE_DIR "/io/" + name + ".schema.json"),
+                                                support::checkout("io/") + name + ".schema.json"),
                       "");
     }
 }
@@ -260,7 +261,7 @@ TEST_F(TwoSided, ABuildKilledAfterAnyStepGoesOnFromDisk) {
             (void)resume_build(context, folder, finished(static_cast<int>(after)));
             if (after == 1) {  // when the slab is milled from below and not turned yet
                 EXPECT_EQ(support::schema_complaint(slurp(folder + "/progress.json"),
-                                                    SLABWRIGHT_SOURCE_DIR "/io/progress.schema.json"),
+                                                    support::checkout("io/progress.schema.json")),
                           "");
             }
             // What is on disk is what the steps bring about.
@@ -344,7 +345,7 @@ TEST_F(TwoSided, AQuoteSaysWhatThePlanSays) {
 
 TEST_F(TwoSided, CommandsSayWhatTheyCannotDo) {
     const auto told = [&](std::vector<std::string> arguments) {
-        arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
+        arguments.insert(arguments.begin(), support::built_command());
         return support::run_command(arguments);
     };
     // The option brings two dowels a joint with it; those of 8 mm are too narrow for the fixed library.

@@ -15,6 +15,7 @@
 #include "io/slabwright.h"
 #include "io/verify.h"
 #include "io/write/stl_writer.h"
+#include "tests/support/places.h"
 
 using namespace slabwright;
 namespace fs = std::filesystem;
@@ -404,7 +405,7 @@ TEST(Verify, EachCorruptionIsReportedAsWhatItIs) {
 TEST(Verify, PlannedHalfSphere) {
     Folder f("sphere");
     Context context;
-    const std::string stl = std::string(SLABWRIGHT_SOURCE_DIR) + "/tests/data/half-sphere.stl";
+    const std::string stl = support::checkout("tests/data/half-sphere.stl");
     write(context, plan(context, stl, Job{}), (f.path / "out").string());
     auto check = [&](const std::string& file, const std::function<void(std::vector<std::string>&)>& corrupt) {
         const fs::path nc = f.path / "out/nc" / file;

@@ -6,7 +6,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 
@@ -205,32 +205,29 @@ private:
         if (bytes_.size() - at_ < size)
             refuse_mesh(kFamily, "truncated", "the data ends inside a number", here(),
                         "copy or export the file again; its end is missing");
-        std::array<char, 8> raw{};
-        std::memcpy(raw.data(), bytes_.data() + at_, size);
-        if ((header_.encoding == Encoding::big) == (std::endian::native == std::endian::little))
-            std::reverse(raw.begin(), raw.begin() + static_cast<std::ptrdiff_t>(size));
+        std::uint64_t raw = 0;
+        for (std::size_t k = 0; k < size; ++k) {
+            const auto byte = static_cast<unsigned char>(bytes_[at_ + k]);
+            raw |= std::uint64_t{byte} << (8 * (header_.encoding == Encoding::big ? size - 1 - k : k));
+        }
         at_ += size;
-        const auto as = [&](auto value) {
-            std::memcpy(&value, raw.data(), sizeof value);
-            return static_cast<double>(value);
-        };
         switch (type) {
             case Type::i8:
-                return as(std::int8_t{});
+                return static_cast<std::int8_t>(raw);
             case Type::u8:
-                return as(std::uint8_t{});
+                return static_cast<std::uint8_t>(raw);
             case Type::i16:
-                return as(std::int16_t{});
+                return static_cast<std::int16_t>(raw);
             case Type::u16:
-                return as(std::uint16_t{});
+                return static_cast<std::uint16_t>(raw);
             case Type::i32:
-                return as(std::int32_t{});
+                return static_cast<std::int32_t>(raw);
             case Type::u32:
-                return as(std::uint32_t{});
+                return static_cast<std::uint32_t>(raw);
             case Type::f32:
-                return as(float{});
+                return std::bit_cast<float>(static_cast<std::uint32_t>(raw));
             case Type::f64:
-                return as(double{});
+                return std::bit_cast<double>(raw);
         }
         return 0;
     }

@@ -1,6 +1,7 @@
 // Bytes as text, for what a page carries within itself.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>

@@ -2,6 +2,7 @@
 // and what is in the way there rules out others.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <vector>

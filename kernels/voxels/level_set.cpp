@@ -55,27 +55,43 @@ struct CellBlock {
 int cell(int i, int j, int k) { return (i * kSide + j) * kSide + k; }
 
 /// OpenVDB asks whether to go on.
-struct Interrupter {
-    Context* context;
-    void start(const char* = nullptr) {}
-    void end() {}
-    [[nodiscard]] bool wasInterrupted(int = -1) const { return context->cancelled(); }
+class Interrupter final : public openvdb::util::NullInterrupter {
+public:
+    explicit Interrupter(Context& context) : context_(context) {}
+    bool wasInterrupted(int /*percent*/ = -1) override { return context_.cancelled(); }
+
+private:
+    Context& context_;
 };
 
-/// The mesh as OpenVDB asks for it, in cells.
-struct MeshInCells {
-    MeshView mesh;
-    double cell_mm;
-    std::array<double, 3> origin;
-
-    [[nodiscard]] std::size_t polygonCount() const { return mesh.facets.size(); }
-    [[nodiscard]] std::size_t pointCount() const { return mesh.vertices.size(); }
-    [[nodiscard]] std::size_t vertexCount(std::size_t) const { return 3; }
-    void getIndexSpacePoint(std::size_t n, std::size_t v, openvdb::Vec3d& point) const {
-        const Vec3f p = mesh.vertices[mesh.facets[n][v]];
-        point = {(p.x - origin[0]) / cell_mm, (p.y - origin[1]) / cell_mm, (p.z - origin[2]) / cell_mm};
+/// How far cells lie from a mesh. OpenVDB is given its own kind of mesh, whose instance the library holds:
+/// one of a kind of ours takes a compiler minutes. Points are rounded to floats, of cells as of millimetres
+/// before.
+/// @param out, in cells that are wanted on either side
+openvdb::FloatGrid::Ptr distance_to(Context& context, MeshView mesh, double cell_mm,
+                                    const std::array<double, 3>& origin, float out, float in, int flags = 0) {
+    const MemoryCharge charge(
+        context, mesh.vertices.size() * sizeof(openvdb::Vec3s) + mesh.facets.size() * sizeof(openvdb::Vec3I),
+        "a mesh in cells");
+    std::vector<openvdb::Vec3s> points(mesh.vertices.size());
+    for (std::size_t v = 0; v < points.size(); ++v) {
+        const Vec3f p = mesh.vertices[v];
+        points[v] = {static_cast<float>((p.x - origin[0]) / cell_mm),
+                     static_cast<float>((p.y - origin[1]) / cell_mm),
+                     static_cast<float>((p.z - origin[2]) / cell_mm)};
     }
-};
+    std::vector<openvdb::Vec3I> facets(mesh.facets.size());
+    for (std::size_t f = 0; f < facets.size(); ++f)
+        facets[f] = {mesh.facets[f][0], mesh.facets[f][1], mesh.facets[f][2]};
+    Interrupter interrupter(context);
+    const auto identity = openvdb::math::Transform::createLinearTransform(1.0);
+    auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
+        static_cast<openvdb::util::NullInterrupter&>(interrupter),
+        openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I>(points, facets), *identity,
+        out, in, flags);
+    context.throw_if_cancelled();
+    return grid;
+}
 
 /// Samples blocks, and finds which others are needed.
 class Sampler {
@@ -290,28 +306,27 @@ private:
     std::unordered_map<BlockPlace, bool, BlockHash> seen_;  // not sampled: whether it lies within
 };
 
-/// Facets of OpenVDB's pools, outwards.
-Mesh taken(const openvdb::tools::VolumeToMesh& mesher, const std::array<double, 3>& origin, double cell_mm) {
+/// The surface where a grid has a value, facets outwards.
+/// @param adaptivity how far facets of flat places may grow, 0 to 1
+Mesh surface_at(Context& context, const openvdb::FloatGrid& grid, double value, double adaptivity,
+                const std::array<double, 3>& origin, double cell_mm) {
+    std::vector<openvdb::Vec3s> points;
+    std::vector<openvdb::Vec3I> triangles;
+    std::vector<openvdb::Vec4I> quads;
+    openvdb::tools::volumeToMesh(grid, points, triangles, quads, value, adaptivity);
+    context.throw_if_cancelled();
     Mesh mesh;
-    mesh.vertices.resize(mesher.pointListSize());
-    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-        const openvdb::Vec3s& p = mesher.pointList()[v];
-        mesh.vertices[v] = {static_cast<float>(origin[0] + cell_mm * static_cast<double>(p.x())),
-                            static_cast<float>(origin[1] + cell_mm * static_cast<double>(p.y())),
-                            static_cast<float>(origin[2] + cell_mm * static_cast<double>(p.z()))};
+    mesh.vertices.reserve(points.size());
+    for (const openvdb::Vec3s& p : points)
+        mesh.vertices.push_back({static_cast<float>(origin[0] + cell_mm * static_cast<double>(p.x())),
+                                 static_cast<float>(origin[1] + cell_mm * static_cast<double>(p.y())),
+                                 static_cast<float>(origin[2] + cell_mm * static_cast<double>(p.z()))});
+    mesh.facets.reserve(2 * quads.size() + triangles.size());
+    for (const openvdb::Vec4I& v : quads) {
+        mesh.facets.push_back({v[0], v[2], v[1]});
+        mesh.facets.push_back({v[0], v[3], v[2]});
     }
-    for (std::size_t n = 0; n < mesher.polygonPoolListSize(); ++n) {
-        const openvdb::tools::PolygonPool& pool = mesher.polygonPoolList()[n];
-        for (std::size_t q = 0; q < pool.numQuads(); ++q) {
-            const openvdb::Vec4I& v = pool.quad(q);
-            mesh.facets.push_back({v[0], v[2], v[1]});
-            mesh.facets.push_back({v[0], v[3], v[2]});
-        }
-        for (std::size_t t = 0; t < pool.numTriangles(); ++t) {
-            const openvdb::Vec3I& v = pool.triangle(t);
-            mesh.facets.push_back({v[0], v[2], v[1]});
-        }
-    }
+    for (const openvdb::Vec3I& v : triangles) mesh.facets.push_back({v[0], v[2], v[1]});
     return mesh;
 }
 
@@ -327,22 +342,14 @@ Mesh surface_of_winding(Context& context, MeshView near, const WindingField& win
     Mesh result;
     // OpenVDB's own parallelism stays within the context's threads.
     run_confined(context, [&] {
-        Interrupter interrupter{&context};
-        const auto transform = openvdb::math::Transform::createLinearTransform(1.0);
-        const auto distance = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
-            interrupter, MeshInCells{near, options.cell_mm, origin}, *transform, kBand, kBand,
-            openvdb::tools::UNSIGNED_DISTANCE_FIELD);
-        context.throw_if_cancelled();
+        const auto distance = distance_to(context, near, options.cell_mm, origin, kBand, kBand,
+                                          openvdb::tools::UNSIGNED_DISTANCE_FIELD);
         const auto about = static_cast<std::uint64_t>(static_cast<double>(distance->tree().leafCount()) *
                                                       kCells * kBytesPerCell);
         const MemoryCharge charge(context, about, "the cells of a rebuilt surface");
         Sampler sampler(context, winding, options, origin, *distance);
         if (!sampler.anything_inside()) return;
-        const openvdb::FloatGrid::Ptr grid = sampler.grid();
-        openvdb::tools::VolumeToMesh mesher(0, options.adaptivity);
-        mesher(*grid);
-        context.throw_if_cancelled();
-        result = taken(mesher, origin, options.cell_mm);
+        result = surface_at(context, *sampler.grid(), 0, options.adaptivity, origin, options.cell_mm);
     });
     return result;
 }
@@ -354,16 +361,9 @@ Mesh offset_surface(Context& context, MeshView mesh, const OffsetSurfaceOptions&
                                        double{box.min.z} - kAside * cell};
     Mesh result;
     run_confined(context, [&] {
-        Interrupter interrupter{&context};
-        const auto transform = openvdb::math::Transform::createLinearTransform(1.0);
-        const auto distance = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
-            interrupter, MeshInCells{mesh, cell, origin}, *transform, static_cast<float>(cells_out) + kBand,
-            kBand);
-        context.throw_if_cancelled();
-        openvdb::tools::VolumeToMesh mesher(cells_out);
-        mesher(*distance);
-        context.throw_if_cancelled();
-        result = taken(mesher, origin, cell);
+        const auto distance =
+            distance_to(context, mesh, cell, origin, static_cast<float>(cells_out) + kBand, kBand);
+        result = surface_at(context, *distance, cells_out, 0, origin, cell);
     });
     return result;
 }

@@ -19,6 +19,7 @@
 #include "io/read/pattern_mesh.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/rs274.h"
 #include "tests/support/temporary_folder.h"
 
@@ -36,7 +37,7 @@ struct Outcome {
 
 Outcome run_command(const std::string& arguments, const fs::path& folder) {
     // timeout's 124 tells a hang from a crash.
-    const std::string command = "timeout 3000 '" SLABWRIGHT_COMMAND "' " + arguments + " >'" +
+    const std::string command = "timeout 3000 '" + support::built_command() + "' " + arguments + " >'" +
                                 (folder / "stdout").string() + "' 2>'" + (folder / "stderr").string() + "'";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), slurp(folder / "stderr")};

@@ -12,6 +12,7 @@
 
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
@@ -28,7 +29,7 @@ inline long soak() {
 /// @param fault as SLABWRIGHT_FAULT says it, e.g. "write 17"; "none"
 inline support::CommandResult run(const Command& command, const std::string& fault,
                                   const std::string& count = {}, const std::string& sites = {}) {
-    return support::run_command(command, {{"LD_PRELOAD", SLABWRIGHT_FAULT_SHIM},
+    return support::run_command(command, {{"LD_PRELOAD", support::fault_shim()},
                                           {"SLABWRIGHT_FAULT", fault},
                                           {"SLABWRIGHT_FAULT_COUNT", count},
                                           {"SLABWRIGHT_FAULT_SITES", sites}});

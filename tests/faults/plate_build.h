@@ -10,6 +10,7 @@
 #include "kernels/mesh/weld.h"
 #include "tests/mesh_shapes.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright::faults {
@@ -71,7 +72,7 @@ struct PlateBuild {
 
 private:
     static std::vector<std::string> with(std::vector<std::string> words) {
-        words.insert(words.begin(), SLABWRIGHT_COMMAND);
+        words.insert(words.begin(), support::built_command());
         words.insert(words.end(), {"--threads", "1"});
         return words;
     }

@@ -7,6 +7,7 @@
 #include "engine/bonding/bond_study.h"
 #include "io/read/bond_csv.h"
 #include "kernels/statistics/distributions.h"
+#include "tests/support/places.h"
 
 namespace slabwright {
 namespace {
@@ -14,7 +15,7 @@ namespace {
 constexpr BondTerm A = 1, B = 2, C = 4;
 
 BondTests brazing() {
-    return read_bond_csv(SLABWRIGHT_SOURCE_DIR "/tests/data/fdff-brazing.csv", {.ignored = {"run"}});
+    return read_bond_csv(support::checkout("tests/data/fdff-brazing.csv"), {.ignored = {"run"}});
 }
 
 /// Print's model leaves BC out, which its analysis of variance rejects.

@@ -30,7 +30,18 @@ struct CommandResult {
     std::uint64_t peak_bytes = 0;  ///< of memory, mapped files too
 };
 
-/// @param interrupt_after seconds until `interrupt_by` is sent; negative: never
+/// Whether a process has a handler for a signal, as Linux tells: from then on the signal does not just end
+/// it.
+inline bool catches(pid_t process, int signal) {
+    std::ifstream status("/proc/" + std::to_string(process) + "/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.rfind("SigCgt:", 0) == 0)
+            return (std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1) != 0;
+    return false;
+}
+
+/// @param interrupt_after seconds from when the command handles `interrupt_by` until it is sent; negative:
+/// never. A loaded machine takes half a second to load the command's libraries, before it can have a handler.
 inline CommandResult run_command(const std::vector<std::string>& arguments,
                                  const std::vector<std::pair<std::string, std::string>>& environment = {},
                                  double interrupt_after = -1, int interrupt_by = SIGINT) {
@@ -60,10 +71,12 @@ inline CommandResult run_command(const std::vector<std::string>& arguments,
     CommandResult result;
     int status = 0;
     bool interrupted = false;
-    Clock::time_point interrupt{};
+    Clock::time_point interrupt{}, ready{};
     rusage used{};
     while (::wait4(child, &status, WNOHANG, &used) == 0) {
-        if (interrupt_after >= 0 && !interrupted && since(begin) >= interrupt_after) {
+        if (interrupt_after >= 0 && ready == Clock::time_point{} && catches(child, interrupt_by))
+            ready = Clock::now();
+        if (ready != Clock::time_point{} && !interrupted && since(ready) >= interrupt_after) {
             interrupted = true;
             interrupt = Clock::now();
             ::kill(child, interrupt_by);

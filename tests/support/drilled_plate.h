@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <numbers>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "kernels/geometry/vectors.h"

@@ -6,6 +6,7 @@
 
 #include "engine/controls.h"
 #include "engine/job.h"
+#include "tests/support/places.h"
 
 namespace slabwright::support {
 
@@ -15,6 +16,6 @@ inline const std::vector<Post> kPosts = [] {
     return all;
 }();
 inline constexpr LengthUnit kUnits[] = {LengthUnit::mm, LengthUnit::inch};
-inline const std::string kModels = SLABWRIGHT_SOURCE_DIR "/tests/data/";
+inline const std::string kModels = support::checkout("tests/data/");
 
 }  // namespace slabwright::support

@@ -12,6 +12,7 @@
 #include "io/posts/program_grid.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/places.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright::support {
@@ -23,7 +24,7 @@ struct ToolpathMotion {
     double cx = 0, cy = 0;       ///< of an arc
 };
 
-inline const std::string kNodeModules = SLABWRIGHT_SOURCE_DIR "/io/report/node_modules";
+inline const std::string kNodeModules = support::checkout("io/report/node_modules");
 
 /// Whether node and gcode-toolpath are there; tools/setup fetches it.
 inline bool has_grbl_toolpath() {
@@ -36,7 +37,7 @@ inline std::map<std::string, std::vector<ToolpathMotion>> grbl_toolpaths(
     const std::map<std::string, std::string>& texts) {
     const TemporaryFolder folder;
     std::vector<std::string> command{"/usr/bin/env", "node",
-                                     SLABWRIGHT_SOURCE_DIR "/tests/posts/grbl_toolpath.mjs", kNodeModules};
+                                     support::checkout("tests/posts/grbl_toolpath.mjs"), kNodeModules};
     for (const auto& [file, text] : texts) {
         spit(folder / file, text);
         command.push_back(folder / file);

@@ -1,0 +1,47 @@
+"""Whether tools/headers tells headers that need something before them.
+
+    headers_test.py SOURCE_FOLDER
+"""
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SOURCE = pathlib.Path(sys.argv.pop(1))
+
+
+class Headers(unittest.TestCase):
+    def said(self, **headers):
+        """Exit status and words over kernels/NAME.h with these texts."""
+        with tempfile.TemporaryDirectory() as folder:
+            kernels = pathlib.Path(folder) / 'kernels'
+            kernels.mkdir()
+            for name, text in headers.items():
+                (kernels / f'{name}.h').write_text('#pragma once\n' + text, encoding='utf-8')
+            run = subprocess.run([SOURCE / 'tools/headers', '--folder', folder], check=False, capture_output=True, text=True)
+            return run.returncode, run.stdout + run.stderr
+
+    def test_passes_what_includes_what_it_names(self):
+        self.assertEqual((0, ''), self.said(a='#include <vector>\nstd::vector<int> f();\n',
+                                            b='#include "kernels/a.h"\ninline auto g() { return f(); }  // std::map is not used\n'))
+
+    def test_tells_a_standard_header_that_others_bring(self):
+        # <map> brings std::pair's definition along on this machine, as the common headers bring all of them here.
+        status, words = self.said(a='#include <map>\nstd::map<int, std::vector<int>> f();\n', b='#include <vector>\n')
+        self.assertEqual(1, status)
+        self.assertIn('kernels/a.h: std::vector is used, but none of these is included: <vector>', words)
+
+    def test_tells_a_header_of_the_project_that_is_not_included(self):
+        status, words = self.said(a='struct Shape {};\n', b='Shape make();\n')
+        self.assertEqual(1, status)
+        self.assertIn('kernels/b.h does not compile alone', words)
+        self.assertNotIn('kernels/a.h', words.split('b.h')[0])
+
+    def test_tells_a_name_that_it_does_not_know(self):
+        status, words = self.said(a='#include <vector>\nusing std::cyl_bessel_j;\n')
+        self.assertEqual(1, status)
+        self.assertIn('std::cyl_bessel_j is not known to tools/headers', words)
+
+
+unittest.main()
