@@ -17,6 +17,7 @@
 #include "engine/planner/replan.h"
 #include "engine/schedule/cut_list.h"
 #include "engine/schedule/magazine.h"
+#include "engine/schedule/schedule.h"
 #include "engine/simulate/simulation_memory.h"
 #include "engine/simulate/work.h"
 #include "engine/tool_choice/access_map.h"
@@ -385,14 +386,18 @@ VerifyResult write_proven(Context& context, Plan& plan, const std::string& direc
             context.share_progress(verified, verified);
             if (!replanner) replanner.emplace(context, found.pattern->read.mesh.view(), *found.pattern->part);
             const std::vector<LayerFaults> faults = faults_of(plan, found);
+            const ProgramNumbers numbers = program_numbers(plan);
             const bool under =
                 naming_file(pattern->place, [&] { return mend_undersides(context, plan, found, round); });
             if (faults.empty() && !under) break;
             std::vector<bool> other;
             if (!faults.empty())
                 other = naming_file(pattern->place, [&] { return replanner->mend(plan, faults, round); });
-            fill(context, plan, out.path(), other.empty() ? std::vector<bool>(plan.layers.size()) : other);
-            if (other.empty() && !under) break;
+            const bool mended = !other.empty() || under;
+            other.resize(plan.layers.size());
+            note_other_numbers(plan, numbers, other);
+            fill(context, plan, out.path(), other);
+            if (!mended) break;
             memory.programs = std::move(found.input.programs);
             found = {};
             found = verify_folder(context, out.path().string(), options);

@@ -237,6 +237,29 @@ TEST_F(ProvenPlan, AnOperationThatRemovesNothingIsDropped) {
     EXPECT_EQ(plan_.layers.front().operations.size(), operations);
 }
 
+TEST_F(ProvenPlan, ProgramsThatAreNumberedThroughAreWrittenAgainWhereTheNumbersChange) {
+    // Over a hundred programs of a layer are numbered through; when those that cut nothing are dropped, every
+    // program has another number.
+    Job job = *job_;
+    job.machine.post = Post::fanuc;
+    job.slabs.thicknesses = {12};
+    const std::shared_ptr<Pattern> pattern = read_pattern(context_, *folder_ / "part.stl", job);
+    Plan made = plan(context_, *pattern, job);
+    ASSERT_GE(made.layers.size(), 2U);
+    const int number = made.layers[1].operations.front().number;
+    EXPECT_EQ(number, 201);
+    Layer& layer = made.layers.front();
+    for (int k = 0; k < 100; ++k) layer.operations.push_back(layer.operations.back());
+    schedule(made);
+    EXPECT_NE(made.layers[1].operations.front().number, number);
+    const std::string out = *folder_ / "numbered";
+    const VerifyResult proven = write_proven(context_, made, out, pattern);
+    for (const Diagnostic& d : proven.violations) ADD_FAILURE() << d.code << ": " << d.message;
+    EXPECT_TRUE(proven.passed);
+    EXPECT_EQ(made.layers[1].operations.front().number, number);
+    EXPECT_TRUE(verify(context_, out, *folder_ / "part.stl").passed);
+}
+
 TEST_F(ProvenPlan, RapidsThatMeetStockGoAboveIt) {
     Layer& layer = plan_.layers.front();
     const auto op = std::find_if(layer.operations.begin(), layer.operations.end(),

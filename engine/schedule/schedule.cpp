@@ -135,6 +135,22 @@ void name_programs(Plan& plan) {
         }
 }
 
+ProgramNumbers program_numbers(const Plan& plan) {
+    ProgramNumbers numbers;
+    for (const Layer& layer : plan.layers)
+        for (const Operation& operation : layer.operations)
+            numbers.emplace(file_of(operation.file), operation.number);
+    return numbers;
+}
+
+void note_other_numbers(const Plan& plan, const ProgramNumbers& before, std::vector<bool>& other) {
+    for (std::size_t l = 0; l < plan.layers.size(); ++l)
+        for (const Operation& operation : plan.layers[l].operations) {
+            const auto found = before.find(file_of(operation.file));
+            if (found != before.end() && found->second != operation.number) other[l] = true;
+        }
+}
+
 void say_tool(SequenceStep& change, int tool, const Machine& machine, int place) {
     change.numbers = {{"tool", tool}};
     if (place != 0) change.numbers.emplace_back("place", place);

@@ -1,6 +1,11 @@
 // The machine's steps (RPM; METHOD.md section 12).
 #pragma once
 
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
 #include "engine/plan.h"
 
 namespace slabwright {
@@ -20,6 +25,15 @@ void say_touch_off(SequenceStep& touch, const Plan& plan, const Layer& layer, do
 /// Operations that share one are "L003.ngc#1", "L003.ngc#2" …, and have one number. The undersides' programs,
 /// which have their names, get numbers that none of the plan's own and of each other's have.
 void name_programs(Plan& plan);
+
+/// The number of each program, by its file.
+using ProgramNumbers = std::map<std::string, int, std::less<>>;
+[[nodiscard]] ProgramNumbers program_numbers(const Plan& plan);
+
+/// Notes the layers of which a program's text has another number than before: where programs are numbered
+/// through, all behind a layer that gains or loses some.
+/// @param other by layer; true is left true
+void note_other_numbers(const Plan& plan, const ProgramNumbers& before, std::vector<bool>& other);
 
 /// Names the programs and fills plan.sequence and plan.totals from the layers (part_volume_mm3 is left as it
 /// is); every step names the steps it needs, so that an interrupted build can resume. The machine is taken to
