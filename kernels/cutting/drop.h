@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "kernels/cutting/flat_way.h"
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/cutting/tool_shape.h"
 
@@ -66,6 +67,11 @@ public:
     /// known.
     [[nodiscard]] std::optional<double> tip_within(double x, double y, double most,
                                                    MetPoints* met = nullptr) const;
+    /// Whether a flat cutter's straight way between places where it is free is free too, to within `over` mm
+    /// (flat_way_is_free).
+    [[nodiscard]] bool way_is_free(const Vec3d& a, const Vec3d& b, double over) const {
+        return flat_way_is_free(solid_, cutter_.radius, a, b, over);
+    }
     [[nodiscard]] const CutterShape& cutter() const { return cutter_; }
 
 private:

@@ -28,7 +28,9 @@ constexpr double kSettle = 0.01;  // mm by which a low point of a line lies unde
 constexpr float kMuch = 0.25F;    // mm left that are worth a search for a place (probe)
 constexpr double kProbed = 1.0;   // mm: of squares of this side one cell is
 constexpr int kProbes = 32;       // places around it
-constexpr double kBridge = 3.0;   // mm between two useful stretches that are travelled along the surface
+constexpr double kOver = 0.005;  // mm by which a straight way may leave the places between its ends, and cut,
+constexpr double kOverShare = 0.25;  // and what share of the gouge tolerance
+constexpr double kBridge = 3.0;      // mm between two useful stretches that are travelled along the surface
 
 struct Line {
     std::int32_t y = 0;
@@ -315,33 +317,81 @@ private:
     }
 
     void append_runs(const Line& line, std::vector<std::vector<PathPoint>>& runs) const {
-        std::vector<PathPoint> points;
+        std::vector<Place> run;
         std::size_t last_cut = 0;
         const Place* before = nullptr;
-        const Place* last = nullptr;  // that cuts
         auto close = [&] {
-            points.resize(last_cut);
-            if (!points.empty())
-                runs.push_back(pass_.in_steps ? points
+            run.resize(last_cut);
+            if (!run.empty()) {
+                std::vector<PathPoint> points = points_along(run);
+                runs.push_back(pass_.in_steps ? std::move(points)
                                               : simplify(points, simplify_tolerance_units(tolerance_)));
-            points.clear();
+            }
+            run.clear();
             last_cut = 0;
         };
         for (const Place& p : line.places) {
             const bool gap = before && apart(p, *before) > chord_ * kUnitsPerMm;
-            if (!points.empty() && (gap || !p.reachable || (!p.cut && apart(p, *last) > to_units(kBridge))))
+            if (!run.empty() &&
+                (gap || !p.reachable || (!p.cut && apart(p, run[last_cut - 1]) > to_units(kBridge))))
                 close();
-            if (p.reachable && (p.cut || !points.empty())) {
+            if (p.reachable && (p.cut || !run.empty())) {
                 // One place beside the first: the cutter comes in along the surface instead of straight down.
-                if (points.empty() && before && !gap && before->reachable)
-                    append(points, {before->x, before->y, before->z});
-                append(points, {p.x, p.y, p.z});
-                if (p.cut) last_cut = points.size(), last = &p;
+                if (run.empty() && before && !gap && before->reachable) run.push_back(*before);
+                run.push_back(p);
+                if (p.cut) last_cut = run.size();
             }
             before = &p;
         }
         close();
     }
+
+    std::vector<PathPoint> points_along(const std::vector<Place>& run) const {
+        std::vector<PathPoint> points;
+        for (std::size_t i = 0, straight = 0; i < run.size(); ++i) {
+            const PathPoint p{run[i].x, run[i].y, run[i].z};
+            // A flat end mill goes up a slope as straight as it may, not by steps.
+            if (i > 0 && i <= straight) {
+                if (i == straight) points.push_back(p);
+            } else {
+                append(points, p);
+            }
+            if (i >= straight && !ball_ && !pass_.in_steps) straight = farthest_straight(run, i);
+        }
+        return points;
+    }
+
+    // The farthest place of a run that a flat end mill may go straight to from the place i, which is itself
+    // where there is none: it grows by doubling, then is looked for between what is free and what is not.
+    std::size_t farthest_straight(const std::vector<Place>& run, std::size_t i) const {
+        if (i + 1 >= run.size() || run[i].z == run[i + 1].z) return i;
+        const double over = std::min(kOver, kOverShare * cut_.job.tolerances.gouge);
+        const auto is_straight = [&](std::size_t j) {
+            const Point3 a = middle_of(run[i]), b = middle_of(run[j]);
+            const double l = std::hypot(b[0] - a[0], b[1] - a[1]);
+            for (std::size_t k = i + 1; k < j; ++k) {
+                const Point3 p = middle_of(run[k]);
+                const double share = std::hypot(p[0] - a[0], p[1] - a[1]) / l;
+                if (length(minus(plus(a, minus(b, a), share), p)) > over) return false;
+            }
+            return index_->way_is_free(a, b, over);
+        };
+        std::size_t good = i, bad = run.size();
+        for (std::size_t step = 1; i + step < run.size(); step *= 2) {
+            if (!is_straight(i + step)) {
+                bad = i + step;
+                break;
+            }
+            good = i + step;
+        }
+        while (good > i && bad - good > 1) {
+            const std::size_t between = good + (bad - good) / 2;
+            (is_straight(between) ? good : bad) = between;
+        }
+        return good;
+    }
+
+    static Point3 middle_of(const Place& p) { return {to_mm(p.x), to_mm(p.y), to_mm(p.z)}; }
 
     // The highest stock under the cutter before this pass, mm.
     [[nodiscard]] double stood(std::int32_t ux, std::int32_t uy) const {
