@@ -246,6 +246,36 @@ TEST(Plunge, NoRunCutsDeeperThanItMay) {
     EXPECT_GT(cuts, 500U);
 }
 
+// Over a part of a long straight way more stands than may be cut at once: all of it is cut, there in steps.
+TEST(Plunge, NoneOfAWayIsLeftOutWhereMoreStandsOverIt) {
+    const Tool& tool = cored_tools()[1];
+    Bench bench(tool);
+    const double r = tool.diameter / 2, y = -60, z = 7;
+    bench.slot(r + 2, {-160, y, 10}, {0, y, 10});
+    bench.slot(r + 2, {60, y, 10}, {160, y, 10});
+    PathBuilder path(bench.operation, tool, 3000, kTop + 10, kTop + 2);
+    Surroundings around = bench.cut.around(tool, &bench.part);
+    around.deepest = 3.5;
+    path.set_surroundings(around);
+    std::vector<PathPoint> run;
+    for (const double x : {-140.0, -90.0, 90.0, 140.0})
+        run.push_back({to_units(x), to_units(y), to_units(z)});
+    path.follow(run);
+    path.finish();
+    EXPECT_TRUE(bench.cut.no_way_in.empty());
+    const std::vector<Move>& moves = bench.operation.moves;
+    for (std::size_t k = 1; k < moves.size(); ++k)
+        bench.stock.cut({CutterEnd::Form::flat, r, 0},
+                        {to_mm(moves[k - 1].x), to_mm(moves[k - 1].y), to_mm(moves[k - 1].z)},
+                        {to_mm(moves[k].x), to_mm(moves[k].y), to_mm(moves[k].z)});
+    for (double x = -140; x <= 140; x += 1) {
+        const CellGrid& grid = bench.stock.grid();
+        const std::size_t cell = grid.index(static_cast<int>(std::lround((x - grid.x(0)) / grid.cell)),
+                                            static_cast<int>(std::lround((y - grid.y(0)) / grid.cell)));
+        EXPECT_NEAR(bench.stock.top(cell), z, 1e-4) << "x " << x;
+    }
+}
+
 // A run too short for the core is left out, and said to be; one as long as the core is wide is not.
 TEST(Plunge, ARampAsLongAsTheCoreIsWide) {
     for (const double length : {12.0, 30.0, 60.0}) {

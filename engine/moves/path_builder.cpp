@@ -414,17 +414,20 @@ bool PathBuilder::comes_down_on_stock(const PathPoint& to) {
 }
 
 // How many points of a run may be followed at once, or, where that is none, may not; `top` then is how high
-// there stands what is too much.
+// there stands what is too much. The last of them is the next stretch's first.
 std::size_t PathBuilder::stretch_at_once(std::span<const PathPoint> run, double& top) {
     learn();
     top = -1e300;
+    // The borders of two levels on an upright wall are not the same to the last digit.
+    CutterShape cutter = around_.cutter;
+    if (cutter.is_flat()) cutter.radius = std::max(0.5 * cutter.radius, cutter.radius - kSliver);
     bool too_much = false;
-    for (std::size_t k = 0; k < run.size(); ++k) {
+    for (std::size_t k = run.size() > 1 ? 1 : 0; k < run.size(); ++k) {
         const PathPoint &p = run[k > 0 ? k - 1 : 0], &q = run[k];
         const double stands =
-            around_.standing->free_tip(around_.cutter, {to_mm(p.x), to_mm(p.y)}, {to_mm(q.x), to_mm(q.y)});
+            around_.standing->free_tip(cutter, {to_mm(p.x), to_mm(p.y)}, {to_mm(q.x), to_mm(q.y)});
         const bool here = stands > to_mm(std::min(p.z, q.z)) + around_.deepest + kBite;
-        if (k == 0) too_much = here;
+        if (k <= 1) too_much = here;
         else if (here != too_much) return k;
         if (here) top = std::max(top, stands);
     }
@@ -435,30 +438,32 @@ void PathBuilder::follow(std::span<const PathPoint> run) {
     if (around_.deepest <= 0 || around_.standing == nullptr) return follow_at_once(run);
     while (!run.empty()) {
         double top = 0;
-        std::span<const PathPoint> stretch = run.first(stretch_at_once(run, top));
-        run = run.subspan(stretch.size());
-        if (top > -1e299) {
-            // From there down, as far along as the cutter is wide on either side: room for a ramp.
-            std::vector<PathPoint> raised(stretch.begin(), stretch.end());
-            const double low = to_mm(std::min_element(stretch.begin(), stretch.end(), [](auto& a, auto& b) {
-                                         return a.z < b.z;
-                                     })->z);
-            const int steps = static_cast<int>(std::ceil((top - low) / around_.deepest));
-            for (int s = steps - 1; s > 0; --s) {
-                for (std::size_t k = 0; k < raised.size(); ++k)
-                    raised[k].z = std::max(stretch[k].z, to_units(low + (top - low) * s / steps));
-                follow_at_once(raised);
-            }
-            const std::size_t n = stretch_at_once(stretch, top);
-            if (top > -1e299 || n < stretch.size()) {
-                if (around_.no_way_in != nullptr)
-                    around_.no_way_in->push_back(
-                        {to_mm(stretch.front().x), to_mm(stretch.front().y), to_mm(stretch.front().z)});
-                continue;
-            }
+        const std::span<const PathPoint> stretch = run.first(stretch_at_once(run, top));
+        run = stretch.size() < run.size() ? run.subspan(stretch.size() - 1) : run.last(0);
+        if (top > -1e299 && !cut_down_to(stretch, top)) {
+            if (around_.no_way_in != nullptr)
+                around_.no_way_in->push_back(
+                    {to_mm(stretch.front().x), to_mm(stretch.front().y), to_mm(stretch.front().z)});
+            continue;
         }
         follow_at_once(stretch);
     }
+}
+
+// From `top` down, as far along as the cutter is wide on either side: room for a ramp. Says whether what
+// stands then may be cut at once.
+bool PathBuilder::cut_down_to(std::span<const PathPoint> stretch, double top) {
+    std::vector<PathPoint> raised(stretch.begin(), stretch.end());
+    const double low = to_mm(
+        std::min_element(stretch.begin(), stretch.end(), [](auto& a, auto& b) { return a.z < b.z; })->z);
+    const int steps = static_cast<int>(std::ceil((top - low) / around_.deepest));
+    for (int s = steps - 1; s > 0; --s) {
+        for (std::size_t k = 0; k < raised.size(); ++k)
+            raised[k].z = std::max(stretch[k].z, to_units(low + (top - low) * s / steps));
+        follow_at_once(raised);
+    }
+    const std::size_t n = stretch_at_once(stretch, top);
+    return !(top > -1e299) && n == stretch.size();
 }
 
 void PathBuilder::follow_at_once(std::span<const PathPoint> run) {

@@ -104,7 +104,9 @@ public:
         0.6;  ///< of a flat end mill's radius: what it does not enter straight down
     static constexpr double kRim =
         1.0;  ///< mm from a face mill's rim inwards in which something may stand where it goes straight down
-    static constexpr double kBite = 0.1;         ///< mm that a tool may meet where it stays down
+    static constexpr double kSliver =
+        0.05;                             ///< mm: what is no wider beside a flat end mill is not looked for
+    static constexpr double kBite = 0.1;  ///< mm that a tool may meet where it stays down
     static constexpr double kLongestWay = 40.0;  ///< mm that it stays down; above, lifting is quicker
 
 private:
@@ -117,6 +119,7 @@ private:
     void follow_at_once(std::span<const PathPoint> run);
     [[nodiscard]] std::size_t follow_part(std::span<const PathPoint> run);
     [[nodiscard]] std::size_t stretch_at_once(std::span<const PathPoint> run, double& top);
+    bool cut_down_to(std::span<const PathPoint> stretch, double top);
     [[nodiscard]] bool straight_is_free(Point2 to, std::int32_t z);
     void descend(const PathPoint& to);
     void land(std::int32_t z);

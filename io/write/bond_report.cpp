@@ -207,48 +207,48 @@ void put_regression(JsonText& json, const BondTests& tests, const BondStudy& stu
 }  // namespace
 
 std::string bond_json(const BondTests& tests, const BondStudy& study, const BondStudyOptions& options) {
-    JsonText json;
-    json.begin_object().key("schema").string("slabwright.bond/1");
-    json.key("response").string(tests.strength_name);
-    json.key("tests").count(tests.strength.size()).key("confidence").exact(options.confidence);
-    json.key("future_runs").integer(options.future_runs);
-    json.key("factors").begin_array();
+    JsonText out;
+    out.begin_object().key("schema").string("slabwright.bond/1");
+    out.key("response").string(tests.strength_name);
+    out.key("tests").count(tests.strength.size()).key("confidence").exact(options.confidence);
+    out.key("future_runs").integer(options.future_runs);
+    out.key("factors").begin_array();
     for (std::size_t f = 0; f < tests.factors.size(); ++f) {
         const BondFactor& factor = tests.factors[f];
-        json.begin_object(JsonText::Shape::line).key("letter").string(term_name(1u << f));
-        json.key("name").string(factor.name).key("levels").begin_array(JsonText::Shape::line);
-        for (const std::string& level : factor.levels) json.string(level);
-        json.end().key("coded").begin_array(JsonText::Shape::line);
-        for (const double coded : factor.coded) json.rounded(coded, 9);
-        json.end().end();
+        out.begin_object(JsonText::Shape::line).key("letter").string(term_name(1u << f));
+        out.key("name").string(factor.name).key("levels").begin_array(JsonText::Shape::line);
+        for (const std::string& level : factor.levels) out.string(level);
+        out.end().key("coded").begin_array(JsonText::Shape::line);
+        for (const double coded : factor.coded) out.rounded(coded, 9);
+        out.end().end();
     }
-    json.end();
+    out.end();
     const Anova& a = study.anova;
-    json.key("anova").begin_object().key("rows").begin_array();
+    out.key("anova").begin_object().key("rows").begin_array();
     for (const AnovaRow& row : a.rows) {
-        json.begin_object(JsonText::Shape::line).key("term").string(term_name(row.term));
-        json.key("df").integer(row.df).key("sequential_ss").rounded(row.sequential_ss, 6);
-        json.key("adjusted_ss").rounded(row.adjusted_ss, 6).key("mean_square").rounded(row.mean_square, 6);
-        if (a.s > 0) json.key("f").rounded(row.f, 9).key("p").rounded(row.p, 9);
-        json.end();
+        out.begin_object(JsonText::Shape::line).key("term").string(term_name(row.term));
+        out.key("df").integer(row.df).key("sequential_ss").rounded(row.sequential_ss, 6);
+        out.key("adjusted_ss").rounded(row.adjusted_ss, 6).key("mean_square").rounded(row.mean_square, 6);
+        if (a.s > 0) out.key("f").rounded(row.f, 9).key("p").rounded(row.p, 9);
+        out.end();
     }
-    json.end().key("error_df").integer(a.error_df).key("error_ss").rounded(a.error_ss, 6);
-    json.key("total_df").integer(a.total_df).key("total_ss").rounded(a.total_ss, 6);
-    json.key("s").rounded(a.s, 9).key("r2").rounded(a.r2, 9).key("r2_adjusted").rounded(a.r2_adjusted, 9);
-    json.end();
-    put_regression(json, tests, study);
-    json.key("cells").begin_array();
+    out.end().key("error_df").integer(a.error_df).key("error_ss").rounded(a.error_ss, 6);
+    out.key("total_df").integer(a.total_df).key("total_ss").rounded(a.total_ss, 6);
+    out.key("s").rounded(a.s, 9).key("r2").rounded(a.r2, 9).key("r2_adjusted").rounded(a.r2_adjusted, 9);
+    out.end();
+    put_regression(out, tests, study);
+    out.key("cells").begin_array();
     for (const BondCell& cell : study.cells) {
-        json.begin_object(JsonText::Shape::line);
-        put_levels(json, tests, cell.levels);
-        json.key("tests").integer(cell.runs).key("mean").rounded(cell.mean, 9);
-        if (study.within_df > 0) put_interval(json, "interval", cell.interval);
-        json.end();
+        out.begin_object(JsonText::Shape::line);
+        put_levels(out, tests, cell.levels);
+        out.key("tests").integer(cell.runs).key("mean").rounded(cell.mean, 9);
+        if (study.within_df > 0) put_interval(out, "interval", cell.interval);
+        out.end();
     }
-    json.end().key("best_cell").count(study.best_cell);
-    json.key("within_variance").rounded(study.within_variance, 9);
-    json.key("within_df").integer(study.within_df).end();
-    return json.take();
+    out.end().key("best_cell").count(study.best_cell);
+    out.key("within_variance").rounded(study.within_variance, 9);
+    out.key("within_df").integer(study.within_df).end();
+    return out.take();
 }
 
 }  // namespace slabwright

@@ -27,7 +27,7 @@ ReachMap reach_map(Context& context, const StandingPart& part, const SimulationI
                                        l == 0 ? layer.z_bottom - board : -kUnbounded);
     };
 
-    struct Side {
+    struct FacetSide {
         Point3 middle{}, normal{};
         double area = 0;
     };
@@ -38,7 +38,7 @@ ReachMap reach_map(Context& context, const StandingPart& part, const SimulationI
         const double vx = double{c.x} - a.x, vy = double{c.y} - a.y, vz = double{c.z} - a.z;
         const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx,
                      n = std::sqrt(nx * nx + ny * ny + nz * nz);
-        Side side{
+        FacetSide side{
             {(double{a.x} + b.x + c.x) / 3, (double{a.y} + b.y + c.y) / 3, (double{a.z} + b.z + c.z) / 3},
             {},
             n / 2};
@@ -51,10 +51,10 @@ ReachMap reach_map(Context& context, const StandingPart& part, const SimulationI
     for (std::size_t f = 0; f < model.facets.size(); ++f) area += side_of(f).area;
     map.cell_mm = std::max(0.1, std::sqrt(area / kReachCells));
     std::map<std::array<long, 6>, std::size_t> groups;
-    std::vector<Side> asked;
+    std::vector<FacetSide> asked;
     std::vector<std::size_t> group(model.facets.size(), 0);
     for (std::size_t f = 0; f < model.facets.size(); ++f) {
-        const Side side = side_of(f);
+        const FacetSide side = side_of(f);
         if (!(side.area > 0) || side.normal[2] < -1e-3) continue;
         std::array<long, 6> key{};
         for (std::size_t k = 0; k < 3; ++k) {

@@ -26,8 +26,8 @@ Pieces pieces_of(const std::vector<PathPoint>& points) {
         const PathPoint &a = points[k - 1], &b = points[k];
         const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y,
                      dz = static_cast<double>(b.z) - a.z;
-        const int n =
-            std::max(1, static_cast<int>(std::ceil(to_mm(std::sqrt(dx * dx + dy * dy + dz * dz)) / kPiece)));
+        const int n = std::max(
+            1, static_cast<int>(std::ceil(std::sqrt(dx * dx + dy * dy + dz * dz) / (kUnitsPerMm * kPiece))));
         for (int i = 1; i <= n; ++i) {
             const double t = static_cast<double>(i) / n;
             pieces.ends.push_back(i == n ? b

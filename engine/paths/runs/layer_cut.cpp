@@ -21,12 +21,12 @@ double LayerCut::high(int axis, double beyond) const {
 }
 
 Loops LayerCut::stock_outline() const {
-    Loops stock;
+    Loops outline;
     const Point2 low{to_units(layer.stock_min[0]), to_units(layer.stock_min[1])},
         high{to_units(layer.stock_max[0]), to_units(layer.stock_max[1])};
-    stock.points = {low, {high.x, low.y}, high, {low.x, high.y}};
-    stock.close_loop();
-    return stock;
+    outline.points = {low, {high.x, low.y}, high, {low.x, high.y}};
+    outline.close_loop();
+    return outline;
 }
 
 std::vector<Section> LayerCut::insides(const CutterShape& cutter, std::span<const double> tip_z) const {
