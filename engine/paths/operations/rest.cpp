@@ -30,6 +30,7 @@ constexpr double kProbed = 1.0;   // mm: of squares of this side one cell is
 constexpr int kProbes = 32;       // places around it
 constexpr double kOver = 0.005;  // mm by which a straight way may leave the places between its ends, and cut,
 constexpr double kOverShare = 0.25;  // and what share of the gouge tolerance
+constexpr double kSteepestWay = 3;   // slope up which it goes straight; up walls by steps
 constexpr double kBridge = 3.0;      // mm between two useful stretches that are travelled along the surface
 
 struct Line {
@@ -369,6 +370,7 @@ private:
         const auto is_straight = [&](std::size_t j) {
             const Point3 a = middle_of(run[i]), b = middle_of(run[j]);
             const double l = std::hypot(b[0] - a[0], b[1] - a[1]);
+            if (std::abs(b[2] - a[2]) > kSteepestWay * l) return false;
             for (std::size_t k = i + 1; k < j; ++k) {
                 const Point3 p = middle_of(run[k]);
                 const double share = std::hypot(p[0] - a[0], p[1] - a[1]) / l;
