@@ -36,12 +36,12 @@ constexpr double kUpright = 89.5, kLevel = 0.5, kSteep = 45;  // degrees
 /// of castings and of a pool (bench/quote --fit), least squares of relative errors, those over a quarter
 /// weighing less. Walls and floors are small beside these and go with the places.
 struct Rates {
-    double facing = 2.433, roughing = 0.710, contours = 2.767, raster = 3.899;
+    double facing = 2.219, roughing = 0.752, contours = 2.111, raster = 3.837;
     double narrow =
-        27.46;            // narrow air is roughed by the end mill and again by the finishing tool, and slowly
-    double thin = 35.65;  // thin walls are spared by feed and by passes
-    double place = 2.585;   // min
-    double turn = 0.03091;  // min a radian: machines slow down where an outline turns
+        17.39;            // narrow air is roughed by the end mill and again by the finishing tool, and slowly
+    double thin = 31.68;  // thin walls are spared by feed and by passes
+    double place = 2.529;   // min
+    double turn = 0.03313;  // min a radian: machines slow down where an outline turns
 };
 constexpr Rates kRates{};
 constexpr double kSmallPlace = 150;  // mm: a loop so long counts as half a place
