@@ -334,8 +334,8 @@ TEST_F(TwoSided, AQuoteSaysWhatThePlanSays) {
     EXPECT_LT(q.outcome.unmade_mm3, 1);
     const double minutes = totals["build_minutes"], below = totals["underside_minutes"];
     // A quote's factors are fitted to castings; of a tunnel, all whose slopes pass 45°, it asks for too much.
-    EXPECT_NEAR(q.build_minutes, minutes, 0.7 * minutes);
-    EXPECT_NEAR(q.underside_minutes, below, 0.75 * below);
+    EXPECT_NEAR(q.build_minutes, minutes, 0.5 * minutes);
+    EXPECT_NEAR(q.underside_minutes, below, 0.5 * below);
     EXPECT_NEAR(q.build_minutes,
                 q.cutting_minutes + q.bonding_minutes + q.tool_change_minutes + q.underside_minutes, 1e-9);
     EXPECT_NE(quote_text(quoted).find("1 of the slabs is milled from below first"), std::string::npos)
