@@ -151,7 +151,61 @@ TEST(MedialAxis, ClearancesAreDistancesToTheBorder) {
         for (const MedialLink& l : axis.links)
             EXPECT_LE(std::hypot(axis.points[l.from].x - axis.points[l.to].x,
                                  axis.points[l.from].y - axis.points[l.to].y),
-                      1.5);
+                      1.001);
+    }
+}
+
+// The length of the axis whose ends both are narrower than a limit.
+double narrow_length(const MedialAxis& axis, double most_clearance) {
+    double sum = 0;
+    for (const MedialLink& l : axis.links) {
+        const MedialPoint &a = axis.points[l.from], &b = axis.points[l.to];
+        if (std::max(a.clearance, b.clearance) <= most_clearance) sum += std::hypot(a.x - b.x, a.y - b.y);
+    }
+    return sum;
+}
+
+// What faces nothing near by is left out of the diagram. Where the limit is wide nothing is, and the narrow
+// part of that axis is the same.
+TEST(MedialAxis, WhatIsLeftOutChangesNothing) {
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> any(0, 1);
+    for (int round = 0; round < 60; ++round) {
+        Loops solid;
+        for (int i = 0; i < 30; ++i) {
+            const Place at{2 * kPi * any(random), 150 * any(random), 150 * any(random)};
+            const int sides = 3 + static_cast<int>(60 * any(random) * any(random));
+            const double r = 1 + 12 * any(random), slim = 0.2 + 0.8 * any(random);
+            for (int k = 0; k < sides; ++k)
+                solid.points.push_back(
+                    at.of(r * std::cos(2 * kPi * k / sides), slim * r * std::sin(2 * kPi * k / sides)));
+            solid.close_loop();
+        }
+        solid = simplify(solid);
+        if (round % 2 == 1) {  // holes instead of posts
+            std::reverse(solid.points.begin(), solid.points.end());
+            Loops plate_with_holes;
+            for (const auto& [x, y] : {std::pair{-50, -50}, {200, -50}, {200, 200}, {-50, 200}})
+                plate_with_holes.points.push_back({to_units(x), to_units(y)});
+            plate_with_holes.close_loop();
+            for (std::size_t l = solid.size(); l-- > 0;) {
+                const auto end = static_cast<std::uint32_t>(solid.points.size());
+                for (std::uint32_t i = end - solid.starts[l + 1]; i < end - solid.starts[l]; ++i)
+                    plate_with_holes.points.push_back(solid.points[i]);
+                plate_with_holes.close_loop();
+            }
+            solid = std::move(plate_with_holes);
+        }
+        constexpr double most = 2;  // mm
+        const MedialAxis narrow = narrow_axis(solid, {.most_clearance_mm = most, .step_mm = 0.05}),
+                         wide = narrow_axis(solid, {.most_clearance_mm = 300, .step_mm = 0.05});
+        EXPECT_NEAR(narrow_length(narrow, most), narrow_length(wide, most),
+                    0.01 * narrow_length(wide, most) + 0.3)
+            << "round " << round;
+        EXPECT_GT(narrow_length(wide, 300), narrow_length(narrow, most));
+        const BorderDistance distance(solid);
+        for (const MedialPoint& p : narrow.points)
+            EXPECT_NEAR(distance({to_units(p.x), to_units(p.y)}), p.clearance, 4e-4);
     }
 }
 

@@ -6,10 +6,10 @@
 
 #include <fmt/format.h>
 
-#include "engine/moves/thinning.h"
 #include "kernels/errors.h"
 #include "kernels/geometry/vectors.h"
 #include "kernels/polygons/hull.h"
+#include "kernels/polygons/thinned.h"
 #include "kernels/slicing/silhouette.h"
 
 namespace slabwright {

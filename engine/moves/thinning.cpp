@@ -3,32 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kernels/polygons/farthest.h"
+#include "kernels/polygons/thinned.h"
 
 namespace slabwright {
 
 namespace {
 
-// Of each point of a line, whether it stays.
-std::vector<char> kept_within(std::span<const PathPoint> line, double tolerance) {
-    std::vector<char> keep(line.size(), 0);
-    keep.front() = keep.back() = 1;
+PointRows rows_of(std::span<const PathPoint> line) {
     PointRows rows;
     for (std::vector<double>* row : {&rows.x, &rows.y, &rows.z}) row->reserve(line.size());
     for (const PathPoint& p : line) rows.x.push_back(p.x), rows.y.push_back(p.y), rows.z.push_back(p.z);
-    std::vector<std::pair<std::size_t, std::size_t>> open{{0, line.size() - 1}};
-    const double tolerance2 = tolerance * tolerance;
-    while (!open.empty()) {
-        const auto [first, last] = open.back();
-        open.pop_back();
-        if (last - first < 2) continue;
-        const Farthest farthest = farthest_between(rows, first, last);
-        if (farthest.distance2 <= tolerance2) continue;
-        keep[farthest.at] = 1;
-        open.push_back({first, farthest.at});
-        open.push_back({farthest.at, last});
-    }
-    return keep;
+    return rows;
 }
 
 std::vector<PathPoint> kept_points(std::span<const PathPoint> line, std::span<const char> keep) {
@@ -49,31 +34,15 @@ double turn_at(const PathPoint& a, const PathPoint& b, const PathPoint& c) {
 
 std::vector<PathPoint> simplify(std::span<const PathPoint> line, double tolerance) {
     if (line.size() < 3) return {line.begin(), line.end()};
-    return kept_points(line, kept_within(line, tolerance));
-}
-
-Loops thinned(const Loops& loops, double mm) {
-    Loops result;
-    std::vector<PathPoint> ring;
-    for (std::size_t i = 0; i < loops.size(); ++i) {
-        ring.clear();
-        for (const Point2 p : loops.loop(i)) ring.push_back({p.x, p.y, 0});
-        if (ring.empty()) continue;
-        ring.push_back(ring.front());
-        const std::vector<PathPoint> kept = simplify(ring, mm * kUnitsPerMm);
-        if (kept.size() < 4) continue;
-        for (std::size_t k = 0; k + 1 < kept.size(); ++k) result.points.push_back({kept[k].x, kept[k].y});
-        result.close_loop();
-    }
-    return result;
+    return kept_points(line, kept_within(rows_of(line), tolerance));
 }
 
 std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, double loose, double turn) {
     if (line.size() < 3) return {line.begin(), line.end()};
     // What stays of the finely thinned line within the wider tolerance is a part of it.
-    std::vector<PathPoint> finely = kept_points(line, kept_within(line, fine));
+    std::vector<PathPoint> finely = kept_points(line, kept_within(rows_of(line), fine));
     if (finely.size() < 3) return finely;
-    std::vector<char> keep = kept_within(finely, loose);
+    std::vector<char> keep = kept_within(rows_of(finely), loose);
     std::vector<std::size_t> corners;
     for (std::size_t i = 0; i < finely.size(); ++i)
         if (keep[i]) corners.push_back(i);

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "engine/plan.h"
-#include "kernels/polygons/loops.h"
 
 namespace slabwright {
 
@@ -20,10 +19,6 @@ struct PathPoint {
 /// (Ramer–Douglas–Peucker in three dimensions). First and last stay. Every point of the result lies within
 /// `tolerance` of the polyline given.
 [[nodiscard]] std::vector<PathPoint> simplify(std::span<const PathPoint> line, double tolerance);
-
-/// The same of closed loops, `mm` at most from the chords between the points that stay; loops of fewer than
-/// three points then are left out. Loops may cross where they come nearer to each other than twice that.
-[[nodiscard]] Loops thinned(const Loops& loops, double mm);
 
 /// The same of a line to two tolerances: to `loose` (0.1 µm) where the line then turns by no more than `turn`
 /// (radians) at a point, to `fine` elsewhere. A machine slows down in sharper turns (travel_seconds), so

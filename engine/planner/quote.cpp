@@ -8,7 +8,6 @@
 #include <span>
 #include <vector>
 
-#include "engine/moves/thinning.h"
 #include "engine/plan.h"
 #include "engine/planner/underside.h"
 #include "engine/schedule/blanks.h"
@@ -23,6 +22,7 @@
 #include "kernels/features/unmade_air.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/loops.h"
+#include "kernels/polygons/thinned.h"
 #include "kernels/slicing/slicing.h"
 
 namespace slabwright {

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "engine/moves/thinning.h"
 #include "engine/schedule/joints.h"
 #include "kernels/polygons/pieces.h"
+#include "kernels/polygons/thinned.h"
 
 namespace slabwright {
 

@@ -18,6 +18,7 @@
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/hull.h"
 #include "kernels/polygons/pieces.h"
+#include "kernels/polygons/thinned.h"
 #include "kernels/slicing/silhouette.h"
 #include "kernels/slicing/slicing.h"
 
@@ -44,6 +45,11 @@ Loops rectangle(const std::array<double, 2>& low, const std::array<double, 2>& h
     nest(loops);
     return loops;
 }
+
+/// Points of a section from where on fewer are worth the gap that they leave, mm: far less than
+/// kBesideJoint.
+constexpr std::size_t kDense = 20'000;
+constexpr double kThinned = 0.005;
 
 /// How far from a joint to look into a layer for what stands there: beside it, but not past a thin layer's
 /// middle.
@@ -86,6 +92,8 @@ std::vector<std::vector<JointWood>> wood_at_joints(Context& context, MeshView me
     // Open edges lie in the base plane only, or the loader would have refused them.
     const std::vector<Section> sections = slice(context, mesh, under, {plan.job.tolerances.gap});
     std::vector<Loops> above = shadows(context, mesh, kept);
+    parallel_each(context, above.size(),
+                  [&](std::size_t i) { above[i] = lighter(std::move(above[i]), kDense, kThinned); });
     std::vector<std::vector<JointWood>> joints(plan.layers.size());
     std::size_t next = 0;
     for (std::size_t i = 0; i < plan.layers.size(); ++i) {
@@ -106,7 +114,9 @@ std::vector<std::vector<JointWood>> wood_at_joints(Context& context, MeshView me
             JointWood& wood = joints[i][k];
             const bool whole = i == 0 || k > 0;  // the board, or a slab that is not cut yet
             if (whole) wood.below = rectangle(slab.min, slab.max);
-            else wood.below = intersect(sections[2 * (i - 1)].loops, sections[2 * (i - 1) + 1].loops);
+            else
+                wood.below = lighter(intersect(sections[2 * (i - 1)].loops, sections[2 * (i - 1) + 1].loops),
+                                     kDense, kThinned);
             if (plan.flask && stands_above(plan.layers[i], wood.z)) {
                 const Loops frame = flask_frame(*plan.flask, i);
                 wood.above = unite(wood.above, frame);

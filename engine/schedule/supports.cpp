@@ -5,11 +5,11 @@
 #include <cmath>
 #include <optional>
 
-#include "engine/moves/thinning.h"
 #include "engine/stock/loose.h"
 #include "kernels/mesh/facet_roles.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/polygons/pieces.h"
+#include "kernels/polygons/thinned.h"
 
 namespace slabwright {
 

@@ -65,7 +65,8 @@ struct NarrowCavity {
 
 /// The narrow cavities of a pattern that is milled from above in layers; air under a roof of the same layer
 /// stays filled and is none. Widths of upright walls are exact to the 0.1 µm of sections, on arcs to the
-/// mesh's chords. The slenderest first (ties: by place). The same on any number of threads.
+/// mesh's chords; of sections with more than 20 000 points within 0.02 mm. The slenderest first (ties: by
+/// place). The same on any number of threads.
 /// @param layer_tops z, ascending, the last at the pattern's top
 /// @param features of the mesh: levels lie just under and over its flats
 /// @throws Error(usage, "cavities.options") for limits out of order; and as shadows()

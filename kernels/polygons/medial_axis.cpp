@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "kernels/geometry/vectors.h"
+#include "kernels/polygons/facing_edges.h"
 #include "kernels/polygons/farthest.h"
 #include "kernels/polygons/plane_edges.h"
 
@@ -168,8 +169,11 @@ private:
 /// Keeps the narrow part of the diagram.
 class NarrowAxis {
 public:
-    NarrowAxis(const Loops& solid, const MedialLimits& limits)
-        : solid_(solid), limits_(limits), edges_(edges_meeting_in_ends(without_straight_corners(solid))) {
+    NarrowAxis(const Loops& solid, const MedialLimits& limits) : solid_(solid), limits_(limits) {
+        // What is round is so narrow between walls on three sides of it.
+        const double spread = std::min(limits.least_spread_rad, 2 * std::numbers::pi / 3);
+        edges_ = edges_meeting_in_ends(facing_edges(without_straight_corners(solid),
+                                                    2 * limits.most_clearance_mm * kUnitsPerMm, spread));
         for (std::uint32_t i = 0; i < edges_.size(); ++i) by_end_.push_back(i);
         for (const Point2 p : solid.points) {
             low_ = {std::min(low_.x, double(p.x)), std::min(low_.y, double(p.y))};
@@ -218,6 +222,8 @@ private:
         const Point2 corner = s.begins_edge ? e.a : e.b;
         const auto into = std::equal_range(by_end_.begin(), by_end_.end(), corner, EndsBefore{edges_});
         const auto out = std::equal_range(edges_.begin(), edges_.end(), corner, BeginsBefore{});
+        // Where a wall goes on that was left out, no place beside its end has that end for its nearest.
+        if (into.second == into.first || out.second == out.first) return false;
         if (into.second - into.first == 1 && out.second - out.first == 1) {
             const PlaneEdge& before = edges_[*into.first];
             const double turns = cross(of(before.b) - of(before.a), of(out.first->b) - of(out.first->a));
@@ -236,7 +242,8 @@ private:
         const Vec2d to_s = s.foot(p) - p, to_t = t.foot(p) - p;
         found.clearance = length(to_s);
         found.spread = std::abs(std::atan2(cross(to_s, to_t), dot(to_s, to_t)));
-        found.kept = narrow(found.clearance) && found.spread >= limits_.least_spread_rad && in_air(s, p);
+        found.kept = narrow(found.clearance) && found.spread >= limits_.least_spread_rad && in_air(s, p) &&
+                     in_air(t, p);
         return found;
     }
 
@@ -273,6 +280,16 @@ private:
         if (last < 1) shares.push_back(last);
         if (pinched) shares.push_back(pinch);
         std::sort(shares.begin(), shares.end());
+        // Far from its pinch a parabola runs farther than its share says.
+        const double step = limits_.step_mm * kUnitsPerMm + 1;
+        const auto wide = [&](const Vec2d& p) { return length(s.foot(p) - p) > most + 1; };
+        for (std::size_t i = 0; i + 1 < shares.size();) {
+            const double half_way = (shares[i] + shares[i + 1]) / 2;
+            const Vec2d a = bisector.at(shares[i]), b = bisector.at(shares[i + 1]);
+            if (length(b - a) > step && !wide(a) && !wide(b))
+                shares.insert(shares.begin() + static_cast<std::ptrdiff_t>(i) + 1, half_way);
+            else ++i;
+        }
         Sample before;
         std::uint32_t before_point = kNone;
         for (const double share : shares) {
@@ -300,15 +317,18 @@ private:
             std::vector<double>& angles = shares_;
             angles.clear();
             const Diagram::edge_type* e = v.incident_edge();
+            bool all_in_air = true;
             do {
-                const Vec2d to = source(*e->cell()).foot(p) - p;
+                const Source nearest = source(*e->cell());
+                const Vec2d to = nearest.foot(p) - p;
                 angles.push_back(std::atan2(to.y, to.x));
+                all_in_air = all_in_air && in_air(nearest, p);
                 e = e->rot_next();
             } while (e != v.incident_edge());
             std::sort(angles.begin(), angles.end());
             double gap = angles.front() + 2 * std::numbers::pi - angles.back();
             for (std::size_t i = 1; i < angles.size(); ++i) gap = std::max(gap, angles[i] - angles[i - 1]);
-            if (gap > std::numbers::pi + kAngle || !in_air(first, p)) continue;
+            if (gap > std::numbers::pi + kAngle || !all_in_air) continue;
             middles.push_back({p.x / kUnitsPerMm, p.y / kUnitsPerMm, clearance / kUnitsPerMm});
         }
         keep_apart(middles);

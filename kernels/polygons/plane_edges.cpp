@@ -172,6 +172,10 @@ std::vector<PlaneEdge> edges_meeting_in_ends(const Loops& loops) {
         for (std::size_t i = 0; i < loop.size(); ++i)
             edges.push_back({loop[i], loop[i + 1 < loop.size() ? i + 1 : 0]});
     }
+    return edges_meeting_in_ends(std::move(edges));
+}
+
+std::vector<PlaneEdge> edges_meeting_in_ends(std::vector<PlaneEdge> edges) {
     make_unique(edges);
     constexpr int rounds = 4;
     for (int round = 0; round < rounds; ++round)

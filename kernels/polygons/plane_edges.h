@@ -18,5 +18,6 @@ struct PlaneEdge {
 /// Where a few rounds of that do not end (edges within a unit of each other), the shorter of two that still
 /// cross is left out. In ascending order. O(n log n) for edges that cross few of a grid's cells.
 [[nodiscard]] std::vector<PlaneEdge> edges_meeting_in_ends(const Loops& loops);
+[[nodiscard]] std::vector<PlaneEdge> edges_meeting_in_ends(std::vector<PlaneEdge> edges);
 
 }  // namespace slabwright

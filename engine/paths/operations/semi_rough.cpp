@@ -14,6 +14,7 @@
 #include "engine/paths/runs/tolerances.h"
 #include "kernels/geometry/vectors.h"
 #include "kernels/parallel/parallel.h"
+#include "kernels/polygons/thinned.h"
 
 namespace slabwright {
 
