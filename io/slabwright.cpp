@@ -441,7 +441,11 @@ void report(Context& context, const std::string& directory, const PatternSource&
     guarded([&] { write_report(context, directory, {source, three_d, size_limit_mb}); });
 }
 
-void refresh_report(Context& context, const std::string& directory, const PatternSource& source) {
+namespace {
+
+// A report that lies in the folder is made again, as light or as full as it was.
+void refresh(Context& context, const std::string& directory, const PatternSource& source,
+             std::optional<Verification> verified) {
     // The page's own parts lie in its first half megabyte, what it shows behind them.
     std::string head;
     try {
@@ -452,21 +456,50 @@ void refresh_report(Context& context, const std::string& directory, const Patter
     } catch (const Error&) {
         return;
     }
-    report(context, directory, source, head.find("<section id=\"view\"") != std::string::npos);
+    const bool three_d = head.find("<section id=\"view\"") != std::string::npos;
+    write_report(context, directory, {source, three_d}, std::move(verified));
+}
+
+Verification verified(Context& context, const std::string& directory, const PatternSource& source,
+                      const std::string& maps_directory, double cell_mm,
+                      const std::vector<KeepOut>* keep_outs) {
+    check_cell(cell_mm);
+    if (keep_outs != nullptr) validate_keep_outs(*keep_outs);
+    VerifyOptions options;
+    options.keep_outs = keep_outs;
+    options.source = source;
+    options.cell = cell_mm;
+    options.maps_directory = maps_directory;
+    return verify_folder(context, directory, options);
+}
+
+}  // namespace
+
+void refresh_report(Context& context, const std::string& directory, const PatternSource& source) {
+    guarded([&] { refresh(context, directory, source, {}); });
 }
 
 VerifyResult verify(Context& context, const std::string& directory, const PatternSource& source,
                     const std::string& maps_directory, double cell_mm,
                     const std::vector<KeepOut>* keep_outs) {
+    return guarded(
+        [&] { return verdict(verified(context, directory, source, maps_directory, cell_mm, keep_outs)); });
+}
+
+RefreshedVerification verify_and_refresh(Context& context, const std::string& directory,
+                                         const PatternSource& source, const std::string& maps_directory,
+                                         double cell_mm, const std::vector<KeepOut>* keep_outs) {
     return guarded([&] {
-        check_cell(cell_mm);
-        if (keep_outs != nullptr) validate_keep_outs(*keep_outs);
-        VerifyOptions options;
-        options.keep_outs = keep_outs;
-        options.source = source;
-        options.cell = cell_mm;
-        options.maps_directory = maps_directory;
-        return verdict(verify_folder(context, directory, options));
+        Verification found = verified(context, directory, source, maps_directory, cell_mm, keep_outs);
+        RefreshedVerification both{verdict(found), {}};
+        try {
+            guarded([&] { refresh(context, directory, source, std::move(found)); });
+        } catch (const Error& error) {
+            if (error.kind() == ErrorKind::cancelled) throw;
+            both.stale =
+                fmt::format("{}/report.html could not be brought up to date: {}\n", directory, error.what());
+        }
+        return both;
     });
 }
 

@@ -216,18 +216,6 @@ int run_plan(const Options& options) {
     return found.passed ? 0 : static_cast<int>(ErrorKind::verification);
 }
 
-/// A report that lies in the folder is made again, as light or as full as it was, so that it tells what the
-/// simulation found. What keeps it from being made is told, and changes no verdict. Empty when all went well.
-std::string renew_report(Context& context, const Options& options) {
-    try {
-        refresh_report(context, options.out, options.stl);
-        return {};
-    } catch (const Error& error) {
-        if (error.kind() == ErrorKind::cancelled) throw;
-        return fmt::format("{}/report.html could not be brought up to date: {}\n", options.out, error.what());
-    }
-}
-
 /// Returns whether the programs make the part.
 bool run_sheets(const Options& options, const SheetsOptions& asked) {
     const Job reading = job_of(options);
@@ -254,11 +242,11 @@ bool run_verify(const Options& options) {
     }
     with_context(options, [&](Context& context) {
         const std::vector<KeepOut> keep_outs = job_of(options).machine.keep_outs;
-        const VerifyResult result = verify(context, options.out, options.stl, options.maps, options.cell,
-                                           options.job_file.empty() ? nullptr : &keep_outs);
-        passed = result.passed;
-        const std::string stale = renew_report(context, options);
-        return said(options, [&] { return verdict(result, options.out) + stale; });
+        const RefreshedVerification found =
+            verify_and_refresh(context, options.out, options.stl, options.maps, options.cell,
+                               options.job_file.empty() ? nullptr : &keep_outs);
+        passed = found.result.passed;
+        return said(options, [&] { return verdict(found.result, options.out) + found.stale; });
     });
     return passed;
 }
