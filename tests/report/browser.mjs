@@ -28,6 +28,7 @@ export async function browser(source) {
 // Opens a report; what it complains of and what it asks for are kept.
 export async function open(started, file, options = {}) {
     const page = await started.newPage({viewport: {width: 1280, height: 900}, reducedMotion: 'reduce', ...options});
+    page.setDefaultTimeout(180000);  // other tests run beside this one, and no graphics card draws for it
     const complaints = [], requests = [];
     page.on('console', message => { if (message.type() === 'error' || message.type() === 'warning') complaints.push(message.text()); });
     page.on('pageerror', error => complaints.push(error.message));
