@@ -1,6 +1,7 @@
 // Laying a pattern on its best side.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -91,6 +92,28 @@ TEST(Orientations, FindTheBackOfABlockHoweverItLies) {
         double most = 0;
         for (const Orientation& way : ways) most = std::max(most, way.outcome.unmade_mm3);
         EXPECT_GT(most, 0.3 * 80 * 32 * 40);
+    }
+}
+
+// Askew, a block takes less wood when it is turned about the upright, but as it lies stays among the ways,
+// with the same unmade, before the other.
+TEST(Orientations, AsItLiesIsAmongTheWays) {
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> degrees(10, 80);
+    for (int k = 0; k < 4; ++k) {
+        Context context;
+        const Mesh mesh = weld(context, turned_facets(grooved(), {180, 0, degrees(random)}));
+        const std::vector<Orientation> ways = orientations(context, mesh.view(), Job{});
+        const auto of = [&](auto&& is) { return std::find_if(ways.begin(), ways.end(), is); };
+        const auto lies = of([](const Orientation& w) { return w.turn == std::array<double, 3>{}; });
+        const auto turned_about_z =
+            of([](const Orientation& w) { return w.turn[0] == 0 && w.turn[1] == 0 && w.turn[2] != 0; });
+        ASSERT_NE(lies, ways.end());
+        ASSERT_NE(turned_about_z, ways.end());
+        EXPECT_EQ(lies->outcome.unmade_mm3, turned_about_z->outcome.unmade_mm3);
+        EXPECT_GT(lies->outcome.unmade_mm3, 0);
+        EXPECT_LT(lies, turned_about_z);
+        EXPECT_LT(turned_about_z->size[0] * turned_about_z->size[1], lies->size[0] * lies->size[1]);
     }
 }
 

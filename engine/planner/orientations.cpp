@@ -152,18 +152,30 @@ std::vector<Orientation> orientations(Context& context, MeshView mesh, const Job
             downs.push_back(normal);
     }
     std::vector<Orientation> found;
-    for (const Vec3d& down : downs) {
+    const auto add = [&](const std::array<double, 3>& turn) -> Orientation& {
         context.throw_if_cancelled();
         Orientation way;
-        way.turn = turn_that_lays(down);
-        way.turn[2] = rounded(turn_in_plane(mesh, hull, way.turn, job.slabs));
+        way.turn = turn;
         const Mesh laid = laid_down(mesh, way.turn);
         const Box3 lies = bounds(context, laid.view());
         way.size = minus(to_double(lies.max), to_double(lies.min));
         way.foot_mm2 =
             area(simplify(slice(context, laid.view(), std::vector<Plane>{{kOnBoard, Side::above}})[0].loops));
         way.outcome = lying(context, laid.view(), job);
-        found.push_back(way);
+        return found.emplace_back(std::move(way));
+    };
+    for (const Vec3d& down : downs) {
+        std::array<double, 3> turn = turn_that_lays(down);
+        const bool as_it_lies = turn == std::array<double, 3>{};
+        // Turned about the upright the pattern may take less wood, but it need not be built sooner.
+        if (as_it_lies) add(turn);
+        turn[2] = rounded(turn_in_plane(mesh, hull, turn, job.slabs));
+        if (as_it_lies && turn[2] == 0) continue;
+        Orientation& way = add(turn);
+        if (as_it_lies) {  // what stays unmade is the same, but for rounding
+            way.outcome.unmade_mm3 = found.front().outcome.unmade_mm3;
+            way.foot_mm2 = found.front().foot_mm2;
+        }
     }
     const auto rank = [](const Orientation& w) {
         return std::tuple(!w.outcome.has_room, std::floor(w.outcome.unmade_mm3 / 10), w.outcome.layers,

@@ -22,9 +22,9 @@ struct Orientation {
 /// Ways to lay a pattern down, each looked at as a plan looks at it, the best first: with room, then least
 /// unmade (to a hundredth of a cubic centimetre), fewest layers, largest foot. As it lies, on each side of
 /// its box, and on the facets of its convex hull that have at least a hundredth of the hull's surface, the
-/// largest `most_facets` of them; in the plane so that its outline's box is least, and lies within the slab.
-/// Ways that differ by less than half a degree are one. Deterministic; some tenths of a second each for a
-/// million facets.
+/// largest `most_facets` of them; in the plane so that its outline's box is least, and lies within the slab;
+/// as it lies also not turned at all. Ways that differ by less than half a degree are one. Deterministic;
+/// some tenths of a second each for a million facets.
 /// @param mesh a solid. @throws as lying()
 [[nodiscard]] std::vector<Orientation> orientations(Context& context, MeshView mesh, const Job& job,
                                                     std::size_t most_facets = 12);
