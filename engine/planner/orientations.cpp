@@ -162,7 +162,7 @@ std::vector<Orientation> orientations(Context& context, MeshView mesh, const Job
         way.foot_mm2 =
             area(simplify(slice(context, laid.view(), std::vector<Plane>{{kOnBoard, Side::above}})[0].loops));
         way.outcome = lying(context, laid.view(), job);
-        return found.emplace_back(std::move(way));
+        return found.emplace_back(way);
     };
     for (const Vec3d& down : downs) {
         std::array<double, 3> turn = turn_that_lays(down);

@@ -48,7 +48,8 @@ Loops thinned(const Loops& loops, double mm) {
 }
 
 Loops lighter(Loops loops, std::size_t most, double mm) {
-    return loops.points.size() > most ? simplify(thinned(loops, mm)) : loops;
+    if (loops.points.size() > most) loops = simplify(thinned(loops, mm));
+    return loops;
 }
 
 }  // namespace slabwright
