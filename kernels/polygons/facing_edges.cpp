@@ -25,9 +25,9 @@ struct Stretch {
 };
 
 /// Cuts one loop into stretches, each no longer than `width` unless it is one edge.
-class Cutter {
+class LoopDivider {
 public:
-    Cutter(const Loops& loops, double width) : loops_(loops), width_(width) {}
+    LoopDivider(const Loops& loops, double width) : loops_(loops), width_(width) {}
 
     std::vector<Stretch> run() {
         for (std::size_t l = 0; l < loops_.size(); ++l)
@@ -101,7 +101,7 @@ void each_near(const std::vector<Stretch>& by_low_x, double width, Take&& take) 
 }  // namespace
 
 std::vector<PlaneEdge> facing_edges(const Loops& solid, double width, double spread_rad) {
-    std::vector<Stretch> stretches = Cutter(solid, width).run();
+    std::vector<Stretch> stretches = LoopDivider(solid, width).run();
     std::sort(stretches.begin(), stretches.end(), [](const Stretch& a, const Stretch& b) {
         return a.low.x != b.low.x ? a.low.x < b.low.x
                : a.loop != b.loop ? a.loop < b.loop
