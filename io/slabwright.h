@@ -203,18 +203,18 @@ struct VerifyResult {
 SLABWRIGHT_API void refresh_report(Context& context, const std::string& directory,
                                    const PatternSource& source = {});
 
-struct RefreshedVerification {
+struct RenewedVerdict {
     VerifyResult result;
     std::string stale;  ///< what kept the report from being made again, a line; "": nothing
 };
 
 /// verify() and refresh_report() of what it has read. What keeps the report from being made changes no
-/// verdict.
-/// @throws as verify()
-[[nodiscard]] SLABWRIGHT_API RefreshedVerification
-verify_and_refresh(Context& context, const std::string& directory, const PatternSource& source = {},
-                   const std::string& maps_directory = {}, double cell_mm = 0,
-                   const std::vector<KeepOut>* keep_outs = nullptr);
+/// verdict. @throws as verify()
+[[nodiscard]] SLABWRIGHT_API RenewedVerdict reverify(Context& context, const std::string& directory,
+                                                     const PatternSource& source = {},
+                                                     const std::string& maps_directory = {},
+                                                     double cell_mm = 0,
+                                                     const std::vector<KeepOut>* keep_outs = nullptr);
 
 enum class InspectionForm : std::uint8_t {
     json,  ///< schema slabwright.inspect/1

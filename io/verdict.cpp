@@ -107,12 +107,12 @@ VerifyResult verify(Context& context, const std::string& directory, const Patter
         [&] { return verdict(verified(context, directory, source, maps_directory, cell_mm, keep_outs)); });
 }
 
-RefreshedVerification verify_and_refresh(Context& context, const std::string& directory,
-                                         const PatternSource& source, const std::string& maps_directory,
-                                         double cell_mm, const std::vector<KeepOut>* keep_outs) {
+RenewedVerdict reverify(Context& context, const std::string& directory, const PatternSource& source,
+                        const std::string& maps_directory, double cell_mm,
+                        const std::vector<KeepOut>* keep_outs) {
     return guarded([&] {
         Verification found = verified(context, directory, source, maps_directory, cell_mm, keep_outs);
-        RefreshedVerification both{verdict(found), {}};
+        RenewedVerdict both{verdict(found), {}};
         try {
             guarded([&] { refresh(context, directory, source, std::move(found)); });
         } catch (const Error& error) {

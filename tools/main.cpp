@@ -242,9 +242,8 @@ bool run_verify(const Options& options) {
     }
     with_context(options, [&](Context& context) {
         const std::vector<KeepOut> keep_outs = job_of(options).machine.keep_outs;
-        const RefreshedVerification found =
-            verify_and_refresh(context, options.out, options.stl, options.maps, options.cell,
-                               options.job_file.empty() ? nullptr : &keep_outs);
+        const RenewedVerdict found = reverify(context, options.out, options.stl, options.maps, options.cell,
+                                              options.job_file.empty() ? nullptr : &keep_outs);
         passed = found.result.passed;
         return said(options, [&] { return verdict(found.result, options.out) + found.stale; });
     });
