@@ -46,11 +46,6 @@ Loops rectangle(const std::array<double, 2>& low, const std::array<double, 2>& h
     return loops;
 }
 
-/// Points of a section from where on fewer are worth the gap that they leave, mm: far less than
-/// kBesideJoint.
-constexpr std::size_t kDense = 20'000;
-constexpr double kThinned = 0.005;
-
 /// How far from a joint to look into a layer for what stands there: beside it, but not past a thin layer's
 /// middle.
 double beside(const Layer& layer) { return std::min(kBesideJoint, (layer.z_top - layer.z_bottom) / 4); }
@@ -92,8 +87,7 @@ std::vector<std::vector<JointWood>> wood_at_joints(Context& context, MeshView me
     // Open edges lie in the base plane only, or the loader would have refused them.
     const std::vector<Section> sections = slice(context, mesh, under, {plan.job.tolerances.gap});
     std::vector<Loops> above = shadows(context, mesh, kept);
-    parallel_each(context, above.size(),
-                  [&](std::size_t i) { above[i] = lighter(std::move(above[i]), kDense, kThinned); });
+    parallel_each(context, above.size(), [&](std::size_t i) { above[i] = lighter(std::move(above[i])); });
     std::vector<std::vector<JointWood>> joints(plan.layers.size());
     std::size_t next = 0;
     for (std::size_t i = 0; i < plan.layers.size(); ++i) {
@@ -115,8 +109,7 @@ std::vector<std::vector<JointWood>> wood_at_joints(Context& context, MeshView me
             const bool whole = i == 0 || k > 0;  // the board, or a slab that is not cut yet
             if (whole) wood.below = rectangle(slab.min, slab.max);
             else
-                wood.below = lighter(intersect(sections[2 * (i - 1)].loops, sections[2 * (i - 1) + 1].loops),
-                                     kDense, kThinned);
+                wood.below = lighter(intersect(sections[2 * (i - 1)].loops, sections[2 * (i - 1) + 1].loops));
             if (plan.flask && stands_above(plan.layers[i], wood.z)) {
                 const Loops frame = flask_frame(*plan.flask, i);
                 wood.above = unite(wood.above, frame);

@@ -23,13 +23,11 @@ namespace {
 constexpr double kUnderFlat = 0.001;  // mm, of the section that stands for what lies just under a flat
 constexpr double kAxisStep = 1;       // mm, between points of an axis
 constexpr double kMostLevels = 150;
-constexpr std::size_t kDense = 20'000;  // points of a section, from where on fewer are worth their gap
-constexpr double kThinned = 0.005;      // mm, that gap
-constexpr double kMostFlats = 400;      // the largest of which get levels of their own
-constexpr double kSameWidth = 1e-3;     // mm
-constexpr double kTip = 0.05;           // share of a level's area: the narrowest may be the tip of a wedge
-constexpr double kSmallLevel = 0.1;     // of the largest level: less of a cavity does not say how wide it is
-constexpr double kWidthJump = 0.1;      // by which the width may differ from level to level
+constexpr double kMostFlats = 400;   // the largest of which get levels of their own
+constexpr double kSameWidth = 1e-3;  // mm
+constexpr double kTip = 0.05;        // share of a level's area: the narrowest may be the tip of a wedge
+constexpr double kSmallLevel = 0.1;  // of the largest level: less of a cavity does not say how wide it is
+constexpr double kWidthJump = 0.1;   // by which the width may differ from level to level
 const double kSteep =
     std::tan(std::numbers::pi / 6);  // and with leaning walls: to either side, up the height
 
@@ -323,7 +321,7 @@ std::vector<NarrowCavity> find_cavities(Context& context, MeshView mesh, std::sp
     const double most_clearance = options.most_width_mm / 2;
     std::vector<std::vector<Piece>> pieces(heights.size());
     parallel_each(context, heights.size(), [&](std::size_t i) {
-        const Loops solid = lighter(std::move(solids[i]), kDense, kThinned);
+        const Loops solid = lighter(std::move(solids[i]));
         const MedialAxis axis =
             narrow_axis(solid, {.most_clearance_mm = most_clearance, .step_mm = kAxisStep});
         pieces[i] = pieces_of(axis, options.least_width_mm / 2);

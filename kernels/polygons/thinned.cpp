@@ -47,8 +47,10 @@ Loops thinned(const Loops& loops, double mm) {
     return result;
 }
 
-Loops lighter(Loops loops, std::size_t most, double mm) {
-    if (loops.points.size() > most) loops = simplify(thinned(loops, mm));
+Loops lighter(Loops loops) {
+    constexpr std::size_t most = 20'000;
+    constexpr double gap_mm = 0.005;
+    if (loops.points.size() > most) loops = simplify(thinned(loops, gap_mm));
     return loops;
 }
 

@@ -1,7 +1,6 @@
 // Loops and lines with fewer points: chords that stay within a tolerance of the line given.
 #pragma once
 
-#include <cstddef>
 #include <vector>
 
 #include "kernels/polygons/farthest.h"
@@ -19,8 +18,8 @@ namespace slabwright {
 /// three points then are left out. Loops may cross where they come nearer to each other than twice that.
 [[nodiscard]] Loops thinned(const Loops& loops, double mm);
 
-/// Loops of more points than `most`, thinned by `mm` and parted again where they would cross; others as they
-/// are.
-[[nodiscard]] Loops lighter(Loops loops, std::size_t most, double mm);
+/// Loops of more than 20 000 points, thinned by 0.005 mm and parted again where they would cross; others as
+/// they are.
+[[nodiscard]] Loops lighter(Loops loops);
 
 }  // namespace slabwright
