@@ -256,6 +256,10 @@ double bending_diameter(const Tool& tool) {
     return std::pow(length * length * length / (3 * sum), 0.25);
 }
 
+double tip_bent_by(const Tool& tool, double force_n) {
+    return cutter_deflection(force_n, tool.stickout, bending_diameter(tool), 1e3 * tool.modulus_gpa);
+}
+
 double strength_diameter(const Tool& tool) {
     if (!has_taper(tool.kind) && tool.kind != ToolKind::cone) return tool.diameter;
     double most = 0;

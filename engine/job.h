@@ -14,6 +14,7 @@
 #include "engine/keep_out.h"
 #include "engine/probing.h"
 #include "kernels/features/features.h"
+#include "kernels/forces/deflection.h"
 #include "kernels/forces/forces.h"
 #include "kernels/geometry/cutter_shape.h"
 
@@ -93,6 +94,7 @@ struct Tool {
     double stepover = 0.5;                      ///< share of the diameter, for clearing
     bool plunges = false;                       ///< cuts straight down into stock (plunges_by_default)
     double strength_mpa = 0;  ///< the cutter's own in bending, as its maker states it; 0: not checked
+    double modulus_gpa = 1e-3 * kSteelMpa;  ///< E, by which it bends
     double core_diameter =
         -1;  ///< within which it has no edge: flat, face, bull-nose; negative: core_diameter_of()
     double ramp_deg = -1;  ///< steepest way down into stock; negative: ramp_limit_deg()
@@ -462,6 +464,9 @@ struct Job {
 /// with a taper 1/L³·3∫(z − a)²/d⁴ = 1/d⁴ over z from a to L, loaded at a, its tip's radius or half its
 /// largest step over the tip.
 [[nodiscard]] double bending_diameter(const Tool& tool);
+/// How far a force across it bends its tip, mm (cutter_deflection, of a cutter as wide as bending_diameter).
+/// @throws Error(usage, "forces.tool") for a negative force
+[[nodiscard]] double tip_bent_by(const Tool& tool, double force_n);
 /// The diameter of the upright cutter that is bent as hard at the holder as this one where that is worst, mm.
 [[nodiscard]] double strength_diameter(const Tool& tool);
 /// Whether it roughs or finishes layers from top to bottom: flat, bull-nose, ball and tapered ball end mills.

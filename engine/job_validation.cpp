@@ -142,6 +142,7 @@ void validate_tool(const Tool& tool, std::size_t position, Post post) {
                            tool.stepover * tool.diameter),
                fmt::format("give a share of the diameter that makes {} mm at least", kLeastAdvance));
     require(key("strength_mpa"), tool.strength_mpa, 0, 1e5);
+    require(key("modulus_gpa"), tool.modulus_gpa, 1, 2000);
     require(key("core_diameter"), tool.core_diameter, -tool.diameter, tool.diameter, Ends::open_both);
     const bool may_have_core = !tool.plunges && (roughs_layers(tool.kind) || tool.kind == ToolKind::face);
     if (tool.core_diameter > 0 && !may_have_core)

@@ -575,6 +575,10 @@ TEST(Deflection, LengthAndDeflectionAreInverse) {
     // A steel-like beam worked by hand: d 10, J = π·8⁴/64 = 201.06 mm⁴; 100 N at 50 mm: 12.5e6 /
     // (3·200e3·201.06) = 0.10362 mm.
     EXPECT_NEAR(cutter_deflection(100, 50, 10), 0.10362, 1e-5);
+    // Of carbide it bends by as much less as that is stiffer, and may be longer by the cube root of it.
+    EXPECT_NEAR(cutter_deflection(100, 50, 10, 550e3), 0.10362 * 200 / 550, 1e-5);
+    EXPECT_NEAR(allowed_tool_length(100, 0.10362, 10, 550e3), 50 * std::cbrt(550.0 / 200), 1e-3);
+    EXPECT_THROW((void)cutter_deflection(1, 1, 1, 0), Error);
 }
 
 // An operation of one straight move at `feed`.

@@ -65,6 +65,8 @@ TEST(Tools, TheShopsLibraries) {
             EXPECT_EQ(tools[i].number, static_cast<int>(i) + 1);
             EXPECT_GT(tools[i].stickout, tools[i].flute_length);
             EXPECT_LE(tools[i].shank_diameter, tools[i].diameter) << "a thicker shank would touch walls";
+            const bool solid = is_end_mill(tools[i].kind) && tools[i].diameter < 13;
+            EXPECT_EQ(tools[i].modulus_gpa, solid ? 550 : 200) << tools[i].name;
         }
         const auto count = [&](ToolKind kind) {
             return std::count_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.kind == kind; });
@@ -170,7 +172,7 @@ TEST(Tools, AStifferTwinIsTakenWhereTheCutterWouldBend) {
         for (const Operation& op : layer.operations) EXPECT_NE(op.tool, 7) << op.purpose;
 }
 
-TEST(Tools, AStifferTwinHasTheSameWidthAndLessStickOut) {
+TEST(Tools, AStifferTwinHasTheSameWidthAndBendsLess) {
     Job job;
     Tool shorter = job.tools[2], thinner = job.tools[1];
     shorter.number = 7, shorter.stickout -= 8, shorter.stepdown_max -= 0.5;
@@ -184,6 +186,15 @@ TEST(Tools, AStifferTwinHasTheSameWidthAndLessStickOut) {
     EXPECT_EQ(stiffer->finish.number, 7);
     EXPECT_EQ(stiffer->finish.stepdown_max, shorter.stepdown_max);
     EXPECT_EQ(stiffer->rough.number, fixed.rough.number);
+    // Of carbide, and longer by less than makes up for it.
+    Tool carbide = job.tools[2];
+    carbide.number = 9, carbide.modulus_gpa = 550, carbide.stickout = 1.2 * shorter.stickout;
+    job.tools.push_back(carbide);
+    EXPECT_LT(tip_bent_by(carbide, 5), tip_bent_by(shorter, 5));
+    EXPECT_EQ(stiffer_tools(job, fixed)->finish.number, 9);
+    job.tools.back().stickout = 1.5 * shorter.stickout;
+    EXPECT_GT(tip_bent_by(job.tools.back(), 5), tip_bent_by(shorter, 5));
+    EXPECT_EQ(stiffer_tools(job, fixed)->finish.number, 7);
 }
 
 // One narrow place does not decide for the layer: the small tools cut there and nowhere else, and with their

@@ -23,7 +23,7 @@ SegmentForces forces_of(const CutSegment& cut, double accuracy) {
 SegmentForces stated_forces(const CutSegment& cut) { return forces_of(cut, kStatedAccuracy); }
 
 Bent bent_by(const SegmentForces& f, double across_n, const Tool& tool) {
-    return {cutter_deflection(across_n, tool.stickout, bending_diameter(tool)),
+    return {tip_bent_by(tool, across_n),
             cutter_stress(f.peak_in_plane_n, tool.stickout, strength_diameter(tool)),
             f.peak_x_n,
             f.peak_y_n,

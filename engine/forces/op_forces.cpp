@@ -64,7 +64,7 @@ void rate_operation(Operation& operation, const Tool& tool, const Job& job) {
     if (cut.high_mm <= 0) return;
     const CutForce force = peak_force(cut);
     operation.peak_force_n = force.peak_resultant_n;
-    operation.deflection_mm = cutter_deflection(force.peak_in_plane_n, tool.stickout, bending_diameter(tool));
+    operation.deflection_mm = tip_bent_by(tool, force.peak_in_plane_n);
     operation.wall_error_mm = operation.deflection_mm;
     operation.peak_torque_nmm = force.torque_nmm;
     operation.peak_power_w = force.power_w;

@@ -88,7 +88,7 @@ void check_limits(const Operation& op, const Tool& tool, const Job& job, const P
     const double stress = cutter_stress(peaks.in_plane.value, tool.stickout, strength_diameter(tool));
     passed.add("cut.strength", tool, peaks.in_plane, stress, tool.strength_mpa,
                fmt::format("{}: the cutter T{} would bear {:.0f} MPa in bending{}, more than its {:.0f} MPa; "
-                           "use a shorter or thicker tool",
+                           "use a shorter, thicker or stiffer tool",
                            op.purpose, tool.number, stress, held, tool.strength_mpa));
     const double torque = op.peak_torque_nmm / 1000, power = op.peak_power_w;
     passed.add("cut.torque", tool, peaks.torque, torque, job.machine.spindle_torque_nm,
@@ -147,8 +147,8 @@ std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan,
             op.peak_force_n = peaks.resultant.value;
             op.peak_at = peaks.resultant.at;
             op.peak_move = peaks.resultant.move;
-            op.deflection_mm = cutter_deflection(peaks.in_plane.value, tool.stickout, bending_diameter(tool));
-            op.wall_error_mm = cutter_deflection(peaks.across.value, tool.stickout, bending_diameter(tool));
+            op.deflection_mm = tip_bent_by(tool, peaks.in_plane.value);
+            op.wall_error_mm = tip_bent_by(tool, peaks.across.value);
             op.peak_torque_nmm = peaks.torque.value;
             op.peak_power_w = peaks.power.value;
             check_limits(op, tool, job, peaks, passed);

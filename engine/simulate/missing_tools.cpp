@@ -161,7 +161,7 @@ struct Descent {
 Descent descent_of(const Tool& tool, const Material& material, double bends) {
     constexpr double kMostDivided = 64, kSlowest = 0.125;
     const double edges = std::hypot(material.kte, material.kfe);  // N for each mm of depth, whatever the feed
-    const double held = bends / cutter_deflection(edges, tool.stickout, tool.diameter) / tool.stepdown_max;
+    const double held = bends / tip_bent_by(tool, edges) / tool.stepdown_max;
     return {tool.stepdown_max * std::clamp(held, 1 / kMostDivided, 1.0), std::clamp(held, kSlowest, 1.0)};
 }
 

@@ -42,7 +42,7 @@ void rate(ReplayPiece& piece, const Tool& tool, const Material& m, double feed, 
     s.arc = engagement_arc(radius_at(s, s.high_mm), piece.width_mm, MillingSense::up);
     const CutForce force = peak_force(s, kForceShare);
     piece.force_n = force.peak_resultant_n;
-    piece.deflection_mm = cutter_deflection(force.peak_in_plane_n, tool.stickout, bending_diameter(tool));
+    piece.deflection_mm = tip_bent_by(tool, force.peak_in_plane_n);
 }
 
 }  // namespace

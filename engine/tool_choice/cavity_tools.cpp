@@ -17,16 +17,16 @@ constexpr double kMostLeft = 0.05;  // of what the library leaves, that a named 
 constexpr double kHalf = 0.5;
 constexpr double kSameLength = 1e-6;  // mm
 
-double step_of(const Job& job, double diameter, double stickout) {
+double step_of(const Job& job, double diameter, double stickout, double modulus_mpa) {
     const double edges = std::hypot(job.material.kte, job.material.kfe);  // N for each mm of depth
-    const double bends = cutter_deflection(edges, stickout, diameter);
+    const double bends = cutter_deflection(edges, stickout, diameter, modulus_mpa);
     return bends > 0 ? std::min(diameter / 2, job.tolerances.cusp / bends) : diameter / 2;
 }
 
 CavityTool of_library(const Job& job, const NarrowCavity& cavity, const Tool& tool) {
     CavityTool found{tool.number, tool.name, tool.diameter, tool.flute_length, tool.stickout};
     found.left_mm2 = cavity.area_under(tool.diameter);
-    found.step_mm = step_of(job, tool.diameter, tool.stickout);
+    found.step_mm = step_of(job, tool.diameter, tool.stickout, 1e3 * tool.modulus_gpa);
     return found;
 }
 
@@ -35,7 +35,7 @@ CavityTool of_catalogue(const Job& job, const NarrowCavity& cavity, const Catalo
     CavityTool found{0, fmt::format("flat end mill {} x {:g} mm", size.words, flutes), size.diameter_mm,
                      flutes, flutes + kCatalogueGrip};
     found.left_mm2 = cavity.area_under(size.diameter_mm);
-    found.step_mm = step_of(job, size.diameter_mm, found.stickout_mm);
+    found.step_mm = step_of(job, size.diameter_mm, found.stickout_mm, kSteelMpa);
     return found;
 }
 

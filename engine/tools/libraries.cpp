@@ -1,5 +1,6 @@
 #include "engine/tools/libraries.h"
 
+#include <span>
 #include <string>
 
 namespace slabwright {
@@ -26,6 +27,16 @@ Tool end_mill(int number, ToolKind kind, const Size& size) {
     tool.stepdown_max = size.stepdown_max;
     tool.plunges = plunges_by_default(kind);
     return tool;
+}
+
+/// Cemented tungsten carbide is commonly given as 530 to 700 GPa, the less the more cobalt it has.
+constexpr double kCarbideGpa = 550;
+
+// End mills up to half an inch are bought of solid carbide; wider ones, and face mills, have bodies of steel.
+void make_of_carbide(std::span<Tool> tools) {
+    constexpr double kWidestSolid = 0.5 * kInch;
+    for (Tool& tool : tools)
+        if (is_end_mill(tool.kind) && tool.diameter <= kWidestSolid) tool.modulus_gpa = kCarbideGpa;
 }
 
 /// A row of LUO table 5.4, inches: the diameter, and the range of its stepdown.
@@ -68,6 +79,7 @@ std::vector<Tool> shop_library() {
     tools.push_back(end_mill(6, ToolKind::flat, in_inches("1/8 in", kEighth, 25.4, 38, 32)));
     tools.push_back(end_mill(7, ToolKind::ball, in_inches("1/2 in", kHalf, 32, 50, 40)));
     tools.push_back(end_mill(8, ToolKind::ball, in_inches("1/8 in", kEighth, 25.4, 38, 32)));
+    make_of_carbide(tools);
     return tools;
 }
 
@@ -90,6 +102,7 @@ std::vector<Tool> forms_library() {
     Tool& drill = add(ToolKind::drill, "drill 8 mm", {"", 8, 0, 8, 50, 65, 32});
     drill.max_rpm = 6000;
     drill.max_feed = drill.plunge_feed = 900;
+    make_of_carbide(std::span(tools).subspan(Job{}.tools.size()));
     return tools;
 }
 
@@ -105,6 +118,7 @@ std::vector<Tool> metric_library() {
     tools.push_back(end_mill(6, ToolKind::flat, three));
     tools.push_back(end_mill(7, ToolKind::ball, twelve));
     tools.push_back(end_mill(8, ToolKind::ball, three));
+    make_of_carbide(tools);
     return tools;
 }
 

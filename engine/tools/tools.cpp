@@ -7,11 +7,18 @@ namespace slabwright {
 
 namespace {
 
+constexpr double kHair = 1e-9;
+
 // The tool of a kind that is as wide as LUO's fixed set has it, else the first of its kind.
 const Tool& fixed_tool(const Job& job, ToolKind kind, double diameter) {
     for (const Tool& tool : job.tools)
         if (tool.kind == kind && std::abs(tool.diameter - diameter) < 1e-3) return tool;
     return tool_of_kind(job, kind);
+}
+
+// Of two cutters as wide, the one whose value is less bends less: L³/E.
+double bends(const Tool& tool) {
+    return tool.stickout * tool.stickout * tool.stickout / tool.modulus_gpa;
 }
 
 // Whether a stiffer twin took the tool's place.
@@ -20,7 +27,7 @@ bool stiffen(const Job& job, Tool& tool) {
     for (const Tool& other : job.tools)
         if (other.kind == tool.kind && std::abs(other.diameter - tool.diameter) < 1e-3 &&
             std::abs(other.corner_radius - tool.corner_radius) < 1e-3 &&
-            std::abs(other.taper_deg - tool.taper_deg) < 1e-3 && other.stickout < stiffest->stickout - 1e-9)
+            std::abs(other.taper_deg - tool.taper_deg) < 1e-3 && bends(other) < (1 - kHair) * bends(*stiffest))
             stiffest = &other;
     if (stiffest == &tool) return false;
     const double least = tool.stepdown_min, most = tool.stepdown_max;

@@ -34,8 +34,8 @@ struct LayerTools {
 /// over is a sliver that tears off when it is cut.
 [[nodiscard]] double least_slab(const Tool& tool);
 
-/// The set with the stiffest twin of each tool in its place: as wide, of its kind, with less stick-out; none
-/// where no tool has one. Stepdowns stay.
+/// The set with the stiffest twin of each tool in its place: as wide, of its kind, that bends less under
+/// the same force; none where no tool has one. Stepdowns stay.
 [[nodiscard]] std::optional<LayerTools> stiffer_tools(const Job& job, const LayerTools& tools);
 
 /// What follows a finish tool (mm across) and a roughing tool so that nothing is left which a tool of the

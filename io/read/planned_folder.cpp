@@ -125,6 +125,8 @@ Tool read_tool(const Field& t) {
     }
     if (t.has("stepover")) tool.stepover = t["stepover"].number();
     if (t.has("strength_mpa")) tool.strength_mpa = t["strength_mpa"].number();
+    if (t.has("modulus_gpa")) tool.modulus_gpa = t["modulus_gpa"].number();
+    if (!(tool.modulus_gpa > 0)) t["modulus_gpa"].fail("is not positive");
     if (t.has("core_diameter")) tool.core_diameter = t["core_diameter"].number();
     if (t.has("ramp_deg")) tool.ramp_deg = t["ramp_deg"].number();
     if (t.has("corner_radius")) tool.corner_radius = t["corner_radius"].number();

@@ -64,6 +64,8 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.key("stepover", tool.stepover, "share of the diameter, for clearing");
     visit.key("strength_mpa", tool.strength_mpa,
               "MPa, the cutter's own in bending, as its maker states it; 0: not checked");
+    visit.key("modulus_gpa", tool.modulus_gpa,
+              "GPa, by which it bends: 200 of steel, as LUO reckons with; 550 or more of cemented carbide");
     visit.key("plunges", tool.plunges,
               "cuts straight down into stock; when left out: false for flat, bull-nose and face");
     visit.key(

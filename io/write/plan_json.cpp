@@ -104,6 +104,7 @@ void put_tool(JsonText& json, const Plan& plan, const Tool& tool) {
     json.key("core_diameter").exact(core_diameter_of(tool));
     json.key("ramp_deg").exact(ramp_limit_deg(tool));
     json.key("strength_mpa").exact(tool.strength_mpa);
+    json.key("modulus_gpa").exact(tool.modulus_gpa);
     double allowed = 0;
     for (const Layer& layer : plan.layers)
         for (const Operation& operation : layer.operations)

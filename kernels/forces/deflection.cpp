@@ -11,9 +11,9 @@ namespace slabwright {
 
 namespace {
 
-double stiffness(double diameter) {  // 3EJ, N·mm²
+double stiffness(double diameter, double modulus_mpa) {  // 3EJ, N·mm²
     const double d = kFluteDiameterShare * diameter;
-    return 3 * kToolModulusMpa * std::numbers::pi * d * d * d * d / 64;
+    return 3 * modulus_mpa * std::numbers::pi * d * d * d * d / 64;
 }
 
 }  // namespace
@@ -35,11 +35,11 @@ bool overhang_holds(const OverhangCut& cut, double thickness) {
     return thickness >= least_overhang_thickness(cut).least_mm;
 }
 
-double cutter_deflection(double force, double length, double diameter) {
-    if (!(diameter > 0 && force >= 0 && length >= 0))
+double cutter_deflection(double force, double length, double diameter, double modulus_mpa) {
+    if (!(diameter > 0 && modulus_mpa > 0 && force >= 0 && length >= 0))
         throw Error(ErrorKind::usage, "forces.tool",
-                    "a cutter needs a positive diameter, and no negative force or length");
-    return force * length * length * length / stiffness(diameter);
+                    "a cutter needs a positive diameter and modulus, and no negative force or length");
+    return force * length * length * length / stiffness(diameter, modulus_mpa);
 }
 
 double cutter_stress(double force, double length, double diameter) {
@@ -50,12 +50,12 @@ double cutter_stress(double force, double length, double diameter) {
     return force * length / (std::numbers::pi * d * d * d / 32);
 }
 
-double allowed_tool_length(double force, double deflection, double diameter) {
-    if (!(diameter > 0 && force >= 0 && deflection >= 0))
+double allowed_tool_length(double force, double deflection, double diameter, double modulus_mpa) {
+    if (!(diameter > 0 && modulus_mpa > 0 && force >= 0 && deflection >= 0))
         throw Error(ErrorKind::usage, "forces.tool",
-                    "a cutter needs a positive diameter, and no negative force or deflection");
+                    "a cutter needs a positive diameter and modulus, and no negative force or deflection");
     if (force == 0) return std::numeric_limits<double>::infinity();
-    return std::cbrt(stiffness(diameter) * deflection / force);
+    return std::cbrt(stiffness(diameter, modulus_mpa) * deflection / force);
 }
 
 }  // namespace slabwright

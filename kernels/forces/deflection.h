@@ -28,13 +28,15 @@ struct OverhangThickness {
 /// Does a slab of this thickness carry the cut?
 [[nodiscard]] bool overhang_holds(const OverhangCut& cut, double thickness_mm);
 
-inline constexpr double kToolModulusMpa = 200e3;  ///< E of the cutter
+inline constexpr double kSteelMpa = 200e3;  ///< E of a cutter of steel, as LUO reckons with
 inline constexpr double kFluteDiameterShare =
     0.8;  ///< a fluted cylinder bends like a full one this much thinner
 
 /// δ = F·L³ / (3EJ), J = π(0.8 d)⁴/64: the tip of a cutter whose flutes reach to the holder (LUO eq. 10).
-/// @throws Error(usage, "forces.tool") unless the diameter is positive and force and length are not negative
-[[nodiscard]] double cutter_deflection(double force_n, double length_mm, double diameter_mm);
+/// @throws Error(usage, "forces.tool") unless diameter and modulus are positive and force and length are not
+/// negative
+[[nodiscard]] double cutter_deflection(double force_n, double length_mm, double diameter_mm,
+                                       double modulus_mpa = kSteelMpa);
 
 /// σ = F·L / W, W = π(0.8 d)³/32: the bending stress of such a cutter at the holder.
 /// @throws Error(usage, "forces.tool") as cutter_deflection
@@ -43,6 +45,7 @@ inline constexpr double kFluteDiameterShare =
 /// L = ∛(3EJδ / F): the longest such cutter that bends by no more than `deflection_mm` (LUO eq. 11); infinite
 /// at no force.
 /// @throws Error(usage, "forces.tool")
-[[nodiscard]] double allowed_tool_length(double force_n, double deflection_mm, double diameter_mm);
+[[nodiscard]] double allowed_tool_length(double force_n, double deflection_mm, double diameter_mm,
+                                         double modulus_mpa = kSteelMpa);
 
 }  // namespace slabwright
