@@ -82,13 +82,13 @@ void check_limits(const Operation& op, const Tool& tool, const Job& job, const P
     const double limit = bending_limit(op, job);
     passed.add("cut.deflection", tool, peaks.across, op.wall_error_mm, limit,
                fmt::format("{}: the cutter T{} may bend by {:.4f} mm{}, more than the {:.4f} mm allowed; use "
-                           "a shorter or thicker tool{}",
+                           "a shorter, thicker or stiffer tool{}",
                            op.purpose, tool.number, op.wall_error_mm, held, limit,
                            lowered ? "" : " or a smaller stepdown"));
     const double stress = cutter_stress(peaks.in_plane.value, tool.stickout, strength_diameter(tool));
     passed.add("cut.strength", tool, peaks.in_plane, stress, tool.strength_mpa,
                fmt::format("{}: the cutter T{} would bear {:.0f} MPa in bending{}, more than its {:.0f} MPa; "
-                           "use a shorter, thicker or stiffer tool",
+                           "use a shorter or thicker tool",
                            op.purpose, tool.number, stress, held, tool.strength_mpa));
     const double torque = op.peak_torque_nmm / 1000, power = op.peak_power_w;
     passed.add("cut.torque", tool, peaks.torque, torque, job.machine.spindle_torque_nm,

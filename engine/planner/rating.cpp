@@ -53,7 +53,7 @@ void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnos
             {Severity::warning,
              rough ? "rough.deflection" : "cut.deflection",
              fmt::format("layer {}, {}: the cutter T{} may bend by {:.3f} mm, more than the "
-                         "{:.3f} mm {}; use a shorter or thicker tool or a smaller stepdown",
+                         "{:.3f} mm {}; use a shorter, thicker or stiffer tool or a smaller stepdown",
                          layer.index, op.purpose, op.tool, op.deflection_mm, allowance,
                          rough ? "it leaves for finishing" : "allowed"),
              {}});
