@@ -52,7 +52,8 @@ double allowed_layer(const Job& job, const Tool& tool) {
             .peak_y_n;
     Tool short_enough = tool;
     short_enough.flute_length =
-        std::min(tool.flute_length, allowed_tool_length(across, job.tolerances.cusp, tool.diameter, 1e3 * tool.modulus_gpa));
+        std::min(tool.flute_length,
+                 allowed_tool_length(across, job.tolerances.cusp, tool.diameter, 1e3 * tool.modulus_gpa));
     return std::max(job.layers.min_layer, max_layer_of(job, short_enough));
 }
 

@@ -7,7 +7,7 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kHair = 1e-9;
+constexpr double kHair = 1e-9;  // mm, or a share: rounding
 
 // The tool of a kind that is as wide as LUO's fixed set has it, else the first of its kind.
 const Tool& fixed_tool(const Job& job, ToolKind kind, double diameter) {
@@ -17,9 +17,7 @@ const Tool& fixed_tool(const Job& job, ToolKind kind, double diameter) {
 }
 
 // Of two cutters as wide, the one whose value is less bends less: L³/E.
-double bends(const Tool& tool) {
-    return tool.stickout * tool.stickout * tool.stickout / tool.modulus_gpa;
-}
+double bends(const Tool& tool) { return tool.stickout * tool.stickout * tool.stickout / tool.modulus_gpa; }
 
 // Whether a stiffer twin took the tool's place.
 bool stiffen(const Job& job, Tool& tool) {
@@ -27,7 +25,8 @@ bool stiffen(const Job& job, Tool& tool) {
     for (const Tool& other : job.tools)
         if (other.kind == tool.kind && std::abs(other.diameter - tool.diameter) < 1e-3 &&
             std::abs(other.corner_radius - tool.corner_radius) < 1e-3 &&
-            std::abs(other.taper_deg - tool.taper_deg) < 1e-3 && bends(other) < (1 - kHair) * bends(*stiffest))
+            std::abs(other.taper_deg - tool.taper_deg) < 1e-3 &&
+            bends(other) < (1 - kHair) * bends(*stiffest))
             stiffest = &other;
     if (stiffest == &tool) return false;
     const double least = tool.stepdown_min, most = tool.stepdown_max;
@@ -58,12 +57,11 @@ double least_slab(const Tool& tool) {
 std::vector<Tool> rest_tools(const Job& job, const Tool& rough, double finish_diameter) {
     // What a flat reaches at a corner a smaller one reaches too, and so it is with balls: the smallest of
     // either kind leave no more than all together.
-    constexpr double hair = 1e-9;
     const bool is_flat = rough.kind == ToolKind::flat;
     std::vector<Tool> rest;
     for (const Tool& tool : job.tools)
-        if ((tool.kind == ToolKind::flat && tool.diameter < rough.diameter + (is_flat ? -hair : hair)) ||
-            (has_ball_tip(tool.kind) && tip_diameter(tool) < finish_diameter - 1e-9))
+        if ((tool.kind == ToolKind::flat && tool.diameter < rough.diameter + (is_flat ? -kHair : kHair)) ||
+            (has_ball_tip(tool.kind) && tip_diameter(tool) < finish_diameter - kHair))
             rest.push_back(tool);
     if (!is_flat && std::none_of(rest.begin(), rest.end(),
                                  [](const Tool& tool) { return tool.kind == ToolKind::flat; })) {
