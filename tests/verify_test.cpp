@@ -385,6 +385,11 @@ TEST(Verify, EachCorruptionIsReportedAsWhatItIs) {
         {"file outside",
          [&](const fs::path& p) { replace(p / "plan.json", "nc/L1_01.ngc", "nc/../plan.json"); },
          "error verify.plan plan.json"},
+        {"tool that bends without end",
+         [&](const fs::path& p) {
+             replace(p / "plan.json", "\"diameter\": 10, ", "\"diameter\": 10, \"modulus_gpa\": 0, ");
+         },
+         "error verify.plan plan.json"},
     };
     for (const Case& c : cases) {
         Folder f("bad");

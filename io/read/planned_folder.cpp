@@ -115,23 +115,20 @@ Tool read_tool(const Field& t) {
     if (t.has("name")) tool.name = t["name"].text();
     if (t.has("flutes")) tool.flutes = t["flutes"].whole();
     if (t.has("helix_deg")) tool.helix_rad = t["helix_deg"].number() * std::numbers::pi / 180;
-    if (t.has("max_rpm")) tool.max_rpm = t["max_rpm"].number();
-    if (t.has("max_feed")) tool.max_feed = t["max_feed"].number();
+    const auto given = [&](const char* key, double& into) {
+        if (t.has(key)) into = t[key].number();
+    };
+    given("max_rpm", tool.max_rpm), given("max_feed", tool.max_feed), given("plunge_feed", tool.plunge_feed);
+    given("stepover", tool.stepover), given("core_diameter", tool.core_diameter);
+    given("strength_mpa", tool.strength_mpa), given("modulus_gpa", tool.modulus_gpa);
+    given("ramp_deg", tool.ramp_deg), given("corner_radius", tool.corner_radius);
+    given("taper_deg", tool.taper_deg), given("point_deg", tool.point_deg);
     tool.plunges = t.has("plunges") ? t["plunges"].boolean() : plunges_by_default(tool.kind);
-    if (t.has("plunge_feed")) tool.plunge_feed = t["plunge_feed"].number();
     if (t.has("stepdown")) {
         tool.stepdown_min = t["stepdown"][std::size_t{0}].number();
         tool.stepdown_max = t["stepdown"][std::size_t{1}].number();
     }
-    if (t.has("stepover")) tool.stepover = t["stepover"].number();
-    if (t.has("strength_mpa")) tool.strength_mpa = t["strength_mpa"].number();
-    if (t.has("modulus_gpa")) tool.modulus_gpa = t["modulus_gpa"].number();
     if (!(tool.modulus_gpa > 0)) t["modulus_gpa"].fail("is not positive");
-    if (t.has("core_diameter")) tool.core_diameter = t["core_diameter"].number();
-    if (t.has("ramp_deg")) tool.ramp_deg = t["ramp_deg"].number();
-    if (t.has("corner_radius")) tool.corner_radius = t["corner_radius"].number();
-    if (t.has("taper_deg")) tool.taper_deg = t["taper_deg"].number();
-    if (t.has("point_deg")) tool.point_deg = t["point_deg"].number();
     if (t["holder"].has("profile")) t["holder"]["profile"].numbers(tool.holder_profile);
     if (!has_flank_and_holder(tool)) t["kind"].fail("has a flank or a holder that can be none");
     if (has_corner(tool.kind) && !(tool.corner_radius > 0 && tool.corner_radius < tool.diameter / 2))
