@@ -11,6 +11,7 @@
 
 #include "io/read/mesh_format.h"
 #include "kernels/errors.h"
+#include "kernels/mesh/surface_facets.h"
 #include "kernels/parallel/context.h"
 
 #ifdef SLABWRIGHT_OCCT
@@ -20,6 +21,7 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <BRepAdaptor_Surface.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRep_Tool.hxx>
 #include <IFSelect_ReturnStatus.hxx>
@@ -77,11 +79,32 @@ std::mutex& turn() {
     return mutex;
 }
 
-/// The facets of faces, whose nodes on an edge are those of the faces beside it.
+/// A face's facets, with nodes as OCCT counts them less one.
+SurfaceFacets facets_of(const Handle(Poly_Triangulation) & triangles, const TopLoc_Location& location) {
+    SurfaceFacets mesh;
+    const bool has_uv = triangles->HasUVNodes();
+    for (int n = 1; n <= triangles->NbNodes(); ++n) {
+        const gp_Pnt p = triangles->Node(n).Transformed(location.Transformation());
+        mesh.at.push_back({p.X(), p.Y(), p.Z()});
+        const gp_Pnt2d uv = has_uv ? triangles->UVNode(n) : gp_Pnt2d();
+        mesh.uv.push_back({uv.X(), uv.Y()});
+    }
+    for (int t = 1; t <= triangles->NbTriangles(); ++t) {
+        int a = 0, b = 0, c = 0;
+        triangles->Triangle(t).Get(a, b, c);
+        mesh.facets.push_back({static_cast<std::uint32_t>(a - 1), static_cast<std::uint32_t>(b - 1),
+                               static_cast<std::uint32_t>(c - 1)});
+    }
+    return mesh;
+}
+
+/// The facets of faces, whose nodes on an edge are those of the faces beside it. OCCT's mesher takes a
+/// deviation as a hint, and goes past it by half and more on real parts: its facets are measured, and
+/// divided.
 class FacetCollector {
 public:
-    FacetCollector(Context& context, DecodedMesh& decoded, const std::string& place)
-        : context_(context), decoded_(decoded), place_(place) {}
+    FacetCollector(Context& context, DecodedMesh& decoded, double deviation_mm, const std::string& place)
+        : context_(context), decoded_(decoded), deviation_mm_(deviation_mm), place_(place) {}
 
     void add(const TopoDS_Face& face) {
         context_.throw_if_cancelled();
@@ -91,30 +114,36 @@ public:
             ++missing_;
             return;
         }
-        std::vector<std::uint32_t> of_node(static_cast<std::size_t>(triangles->NbNodes()) + 1, kNone);
+        SurfaceFacets mesh = facets_of(triangles, location);
+        if (const BRepAdaptor_Surface surface(face, false);
+            triangles->HasUVNodes() && surface.GetType() != GeomAbs_Plane) {
+            const auto at = [&](double u, double v) -> Point3 {
+                const gp_Pnt p = surface.Value(u, v);
+                return {p.X(), p.Y(), p.Z()};
+            };
+            farthest_ = std::max(farthest_, refine_on(at, deviation_mm_, mesh));
+        }
+        std::vector<std::uint32_t> of_node(mesh.at.size(), kNone);
         for (TopExp_Explorer edges(face, TopAbs_EDGE); edges.More(); edges.Next())
-            join(TopoDS::Edge(edges.Current()), triangles, location, of_node);
-        for (int n = 1; n <= triangles->NbNodes(); ++n)
-            if (std::uint32_t& v = of_node[static_cast<std::size_t>(n)]; v == kNone)
-                v = vertex(triangles->Node(n).Transformed(location.Transformation()));
+            join(TopoDS::Edge(edges.Current()), triangles, location, mesh, of_node);
+        for (std::size_t n = 0; n < of_node.size(); ++n)
+            if (of_node[n] == kNone) of_node[n] = vertex(mesh.at[n]);
         const bool turned = (face.Orientation() == TopAbs_REVERSED) !=
                             (location.Transformation().VectorialPart().Determinant() < 0);
-        for (int t = 1; t <= triangles->NbTriangles(); ++t) {
-            int a = 0, b = 0, c = 0;
-            triangles->Triangle(t).Get(a, b, c);
-            const auto at = [&](int n) { return of_node[static_cast<std::size_t>(n)]; };
-            const Index3 facet{at(a), at(turned ? c : b), at(turned ? b : c)};
+        for (const auto& [a, b, c] : mesh.facets) {
+            const Index3 facet{of_node[a], of_node[turned ? c : b], of_node[turned ? b : c]};
             if (facet[0] != facet[1] && facet[1] != facet[2] && facet[2] != facet[0])
                 decoded_.facets.push_back(facet);
         }
     }
     [[nodiscard]] std::size_t missing() const { return missing_; }
+    /// mm from the surfaces to the facets, as measured
+    [[nodiscard]] double farthest() const { return farthest_; }
 
 private:
     static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
-    std::uint32_t vertex(const gp_Pnt& p) {
-        const FileVertex at{p.X(), p.Y(), p.Z()};
+    std::uint32_t vertex(const FileVertex& at) {
         for (const double value : at)
             if (is_absurd(value, 1)) refuse_coordinate(kFamily, value, 1, place_);
         decoded_.vertices.push_back(at);
@@ -122,7 +151,8 @@ private:
     }
     /// Faces beside an edge cut it at the same parameters: their nodes there become one.
     void join(const TopoDS_Edge& edge, const Handle(Poly_Triangulation) & triangles,
-              const TopLoc_Location& location, std::vector<std::uint32_t>& of_node) {
+              const TopLoc_Location& location, const SurfaceFacets& mesh,
+              std::vector<std::uint32_t>& of_node) {
         const Handle(Poly_PolygonOnTriangulation) polygon =
             BRep_Tool::PolygonOnTriangulation(edge, triangles, location);
         if (polygon.IsNull()) return;
@@ -132,11 +162,10 @@ private:
         const bool first = shared->empty();
         if (!first && shared->size() != static_cast<std::size_t>(count)) return;
         for (int i = 1; i <= count; ++i) {
-            std::uint32_t& here = of_node[static_cast<std::size_t>(polygon->Nodes()(i))];
+            const auto node = static_cast<std::size_t>(polygon->Nodes()(i) - 1);
+            std::uint32_t& here = of_node[node];
             if (first) {
-                if (here == kNone)
-                    here =
-                        vertex(triangles->Node(polygon->Nodes()(i)).Transformed(location.Transformation()));
+                if (here == kNone) here = vertex(mesh.at[node]);
                 shared->push_back(here);
             } else if (here == kNone) {
                 here = (*shared)[static_cast<std::size_t>(i - 1)];
@@ -149,14 +178,23 @@ private:
 
     Context& context_;
     DecodedMesh& decoded_;
+    const double deviation_mm_;
+    double farthest_ = 0;
     const std::string& place_;
     NCollection_DataMap<TopoDS_Shape, std::vector<std::uint32_t>, TopTools_ShapeMapHasher> edges_;
     std::size_t missing_ = 0;
 };
 
-DecodedMesh read(Context& context, std::string_view bytes, double deviation_mm, const std::string& place) {
+/// A shape's facets, and how far its surfaces lie from them at most, as measured, mm.
+struct ReadShape {
+    DecodedMesh mesh;
+    double farthest_mm = 0;
+};
+
+ReadShape read(Context& context, std::string_view bytes, double deviation_mm, const std::string& place) {
     Message::DefaultMessenger()->ChangePrinters().Clear();  // a library writes nothing to the terminal
     DecodedMesh decoded;
+    double farthest = 0;
     decoded.mm_per_unit = 1;  // OCCT scales to millimetres, whatever unit the file states
     try {
         Interface_Static::SetCVal("xstep.cascade.unit", "MM");
@@ -173,9 +211,10 @@ DecodedMesh read(Context& context, std::string_view bytes, double deviation_mm, 
         context.throw_if_cancelled();
         constexpr double angle_rad = 0.5;  // between facets of a curve, which else is bound by the deviation
         const BRepMesh_IncrementalMesh meshed(shape, deviation_mm, false, angle_rad, false);
-        FacetCollector collector(context, decoded, place);
+        FacetCollector collector(context, decoded, deviation_mm, place);
         for (TopExp_Explorer faces(shape, TopAbs_FACE); faces.More(); faces.Next())
             collector.add(TopoDS::Face(faces.Current()));
+        farthest = collector.farthest();
         if (collector.missing() > 0)
             decoded.diagnostics.push_back(
                 {Severity::warning, "step.face",
@@ -189,12 +228,13 @@ DecodedMesh read(Context& context, std::string_view bytes, double deviation_mm, 
     if (decoded.facets.empty())
         refuse_mesh(kFamily, "no_facets", "its shapes have no faces", place,
                     "export the solid, not its wires");
-    return decoded;
+    return {std::move(decoded), farthest};
 }
 
 /// What the process that reads hands over, before the arrays or the texts of an error.
 struct Outcome {
     std::uint64_t vertices = 0, facets = 0, warnings = 0;
+    double farthest_mm = 0;
     std::array<std::uint32_t, 4> texts{};  ///< lengths of an error's code, message, place and remedy; 0: none
 };
 
@@ -229,7 +269,8 @@ std::uint64_t data_bytes_now() {
     (void)::setrlimit(RLIMIT_DATA, &data);
     Outcome outcome;
     try {
-        const DecodedMesh decoded = read(context, bytes, deviation_mm, place);
+        const auto [decoded, farthest_mm] = read(context, bytes, deviation_mm, place);
+        outcome.farthest_mm = farthest_mm;
         outcome.vertices = decoded.vertices.size();
         outcome.facets = decoded.facets.size();
         outcome.warnings = decoded.diagnostics.size();
@@ -336,12 +377,20 @@ DecodedMesh read_apart(Context& context, std::string_view bytes, double deviatio
         decoded.diagnostics.push_back({Severity::warning, "step.face",
                                        "faces could not be cut into facets: the mesh may be open",
                                        std::nullopt});
+    // What the mesher measures its edges by, and rounding.
+    constexpr double kSlack = 1.01;
+    const std::size_t facets = decoded.facets.size();
     decoded.diagnostics.push_back(
-        {Severity::note, "step.tessellated",
-         fmt::format("its surfaces were cut into {} facets, which lie within {:g} mm "
-                     "of them",
-                     decoded.facets.size(), deviation_mm),
-         std::nullopt});
+        outcome.farthest_mm <= kSlack * deviation_mm
+            ? Diagnostic{Severity::note, "step.tessellated",
+                         fmt::format("its surfaces were cut into {} facets, which lie within {:g} mm of them",
+                                     facets, deviation_mm),
+                         std::nullopt}
+            : Diagnostic{Severity::warning, "step.deviation",
+                         fmt::format("its surfaces were cut into {} facets, which lie up to {:.3g} mm from "
+                                     "them instead of {:g} mm; ask for less",
+                                     facets, outcome.farthest_mm, deviation_mm),
+                         std::nullopt});
     return decoded;
 }
 
