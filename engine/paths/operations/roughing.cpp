@@ -67,7 +67,7 @@ std::vector<RoughLevel> fixed_levels(const LayerCut& cut, const Tool& tool, doub
 
 // From `top` down to fixed levels (descending) the steps that slopes and the tool allow.
 std::vector<RoughLevel> stepped(const LayerCut& cut, const Tool& tool, double floor, double top,
-                                std::span<const RoughLevel> fixed) {
+                                std::span<const RoughLevel> fixed, double cusp) {
     std::vector<RoughLevel> levels;
     double z = top;
     for (const RoughLevel& f : fixed) {
@@ -77,8 +77,8 @@ std::vector<RoughLevel> stepped(const LayerCut& cut, const Tool& tool, double fl
             // are even.
             const double alpha = cut.least_slope(z - tool.stepdown_max, z,
                                                  cut.job.cutting.steep_limit_deg * std::numbers::pi / 180);
-            const double step = std::clamp(flat_level_stepdown(alpha, cut.job.tolerances.rough_cusp),
-                                           tool.stepdown_min, tool.stepdown_max);
+            const double step =
+                std::clamp(flat_level_stepdown(alpha, cusp), tool.stepdown_min, tool.stepdown_max);
             const double count = std::ceil((z - f.tip) / step - 1e-9);
             if (count <= 1) break;
             z -= (z - f.tip) / count;
@@ -92,8 +92,8 @@ std::vector<RoughLevel> stepped(const LayerCut& cut, const Tool& tool, double fl
 
 }  // namespace
 
-std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool, double floor) {
-    return stepped(cut, tool, floor, cut.layer.z_top, fixed_levels(cut, tool, floor));
+std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool, double floor, double cusp) {
+    return stepped(cut, tool, floor, cut.layer.z_top, fixed_levels(cut, tool, floor), cusp);
 }
 
 namespace {
@@ -110,7 +110,7 @@ struct RoughStep {
 std::vector<RoughStep> level_steps(const LayerCut& cut, const Tool& tool, double floor) {
     std::vector<RoughStep> steps;
     double above = cut.layer.z_top;
-    for (const RoughLevel& level : rough_levels(cut, tool, floor)) {
+    for (const RoughLevel& level : rough_levels(cut, tool, floor, cut.job.tolerances.rough_cusp)) {
         steps.push_back({level, above, steps.size()});
         above = level.tip;
     }
@@ -138,7 +138,8 @@ std::vector<RoughStep> terraced_steps(const LayerCut& cut, const Tool& tool, dou
         for (const RoughLevel& f : fixed)
             if (f.tip < above - 1e-3 && f.tip > z + 1e-3) between.push_back(f);
         between.push_back({z, std::max(bottom, z - floor)});
-        const std::vector<RoughLevel> levels = stepped(cut, tool, floor, above, between);
+        const std::vector<RoughLevel> levels =
+            stepped(cut, tool, floor, above, between, cut.job.tolerances.rough_cusp);
         const std::size_t lowest = steps.size();
         for (std::size_t i = levels.size(); i-- > 0;) steps.push_back({levels[i], above, lowest});
         above = z;

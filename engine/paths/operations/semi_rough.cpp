@@ -381,12 +381,14 @@ private:
                over = -kUnbounded;  // mm: what lies over a surface that is no higher than `over` is left to
                                     // other levels
     };
-    // In the order in which they are cut. A flat end mill's lie on floors too. Between two of a ball's lie
-    // others, for the waste that does not reach down to the next.
+    // In the order in which they are cut. A flat end mill's lie on floors too, and no closer than the stairs
+    // that they leave on slopes are a reason to go there. Between two of a ball's lie others, for the waste
+    // that does not reach down to the next.
     [[nodiscard]] std::vector<Level> levels_of() const {
         std::vector<Level> levels;
         if (!ball_) {
-            for (const RoughLevel& l : rough_levels(cut_, tool_, 0)) levels.push_back({l.tip});
+            for (const RoughLevel& l : rough_levels(cut_, tool_, 0, pass_.limit / 2))
+                levels.push_back({l.tip});
             return levels;
         }
         // As far below the layer as its rings leave ridges between them, so that none stays there as a film
