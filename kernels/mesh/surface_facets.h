@@ -5,7 +5,6 @@
 #include <functional>
 #include <vector>
 
-#include "kernels/export.h"
 #include "kernels/geometry/vectors.h"
 #include "kernels/mesh/mesh.h"
 
