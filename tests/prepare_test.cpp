@@ -20,6 +20,7 @@
 #include "kernels/mesh/weld.h"
 #include "kernels/skin/offset_vertex.h"
 #include "kernels/skin/skin.h"
+#include "kernels/voxels/level_set.h"
 #include "tests/mesh_shapes.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"
@@ -276,6 +277,34 @@ TEST(Skin, IsByVerticesOnACubeAndKeepsItsCorners) {
     EXPECT_NEAR(skinned.report.volume_mm3, 24 * 24 * 24, 1e-2);
     EXPECT_NEAR(skinned.least_mm, 2, 1e-5);
     EXPECT_NEAR(skinned.most_mm, 2 * std::sqrt(3), 1e-5);
+}
+
+/// OpenVDB tells how far a cell lies from facets that are nearest to cells beside it: several cells from a
+/// mesh that can be half a cell too far. Thin rods that lean over each other.
+TEST(Skin, SurfacesAtADistanceAreNoNearer) {
+    Context context({.threads = 2});
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<float> lean(-0.6F, 0.6F), place(-15, 15);
+    Facets rods;
+    for (int b = 0; b < 40; ++b) {
+        const float sx = 3 * lean(random), sy = 3 * lean(random);
+        Facets rod = shapes::box({-.1F, -.1F, 0}, {.1F, .1F, 40});
+        const float x = place(random), y = place(random);
+        for (auto& facet : rod)
+            for (Vec3f& v : facet) v = {v.x + sx * v.z + x, v.y + sy * v.z + y, v.z};
+        shapes::append(rods, rod);
+    }
+    const Mesh mesh = mesh_of(rods);
+    const ClosestPoint closest(context, mesh.view());
+    const auto distance = [&](const Point3& p) { return closest.query_unsigned(p, 100).distance; };
+    for (const double cell : {0.4, 0.75}) {
+        const double mm = 3, sag = 3 * cell * cell / (8 * mm);  // of a cell's diagonal
+        const Mesh surface = offset_surface(context, mesh.view(), distance, {mm, cell});
+        ASSERT_GT(surface.vertices.size(), 1000U);
+        double least = mm;
+        for (const Vec3f& v : surface.vertices) least = std::min(least, distance(to_double(v)));
+        EXPECT_GE(least, mm - sag) << cell;
+    }
 }
 
 TEST(Skin, LiesOnChosenFacetsOnly) {

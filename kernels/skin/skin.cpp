@@ -218,9 +218,12 @@ void by_level_set(Context& context, MeshView mesh, const MeshReport& report, con
     result.cell_mm = cell;
     const MemoryCharge charge(context, static_cast<std::uint64_t>(cells(cell) * kBytesPerSkinCell),
                               "the cells of a skin");
-    double farther = cell * cell / (8 * mm) + kThinned;
+    const ClosestPoint closest(context, mesh);
+    const double radius = 2 * mm + 4 * cell;
+    const auto distance = [&](const Point3& p) { return closest.query_unsigned(p, radius).distance; };
+    double farther = 3 * cell * cell / (8 * mm) + kThinned;
     for (int round = 0; round < kMostRounds; ++round) {
-        result.mesh = offset_surface(context, mesh, {mm + farther, cell});
+        result.mesh = offset_surface(context, mesh, distance, {mm + farther, cell});
         float lowest = bounds(context, result.mesh.view()).min.z;
         for (Vec3f& v : result.mesh.vertices)
             if (double{v.z} - lowest < kBaseShare * cell) v.z = lowest;

@@ -30,8 +30,9 @@ constexpr int kSide = 8;
 constexpr int kCells = kSide * kSide * kSide;
 constexpr int kPart = 4;  // cells along a part of a block that is looked at as a whole
 constexpr int kPartCells = kPart * kPart * kPart;
-constexpr float kBand = 3;            // cells beside the mesh whose distance is known
-constexpr double kClearly = 0.2;      // so far from a half, the winding number is not near the border
+constexpr float kBand = 3;        // cells beside the mesh whose distance is known
+constexpr double kClearly = 0.2;  // so far from a half, the winding number is not near the border
+constexpr double kSurely = 2.5;   // cells from a surface at a distance: beyond, OpenVDB tells the right side
 constexpr double kBytesPerCell = 24;  // of a block, of the tree, and of the surface
 constexpr double kAside = 0.4142;  // cells: no facet of a part that stands square lies on a cell, where its
                                    // sign would be chance
@@ -354,16 +355,31 @@ Mesh surface_of_winding(Context& context, MeshView near, const WindingField& win
     return result;
 }
 
-Mesh offset_surface(Context& context, MeshView mesh, const OffsetSurfaceOptions& options) {
+Mesh offset_surface(Context& context, MeshView mesh, const DistanceField& distance,
+                    const OffsetSurfaceOptions& options) {
     const Box3 box = bounds(context, mesh);
     const double cell = options.cell_mm, cells_out = options.distance_mm / cell;
     const std::array<double, 3> origin{double{box.min.x} - kAside * cell, double{box.min.y} - kAside * cell,
                                        double{box.min.z} - kAside * cell};
     Mesh result;
     run_confined(context, [&] {
-        const auto distance =
+        const auto grid =
             distance_to(context, mesh, cell, origin, static_cast<float>(cells_out) + kBand, kBand);
-        result = surface_at(context, *distance, cells_out, 0, origin, cell);
+        std::vector<openvdb::FloatGrid::TreeType::LeafNodeType*> leaves;
+        grid->tree().getNodes(leaves);
+        parallel_for(context, leaves.size(), 8, [&](std::size_t begin, std::size_t end) {
+            context.throw_if_cancelled();
+            for (std::size_t l = begin; l < end; ++l)
+                for (auto value = leaves[l]->beginValueOn(); value; ++value) {
+                    if (std::abs(static_cast<double>(*value) - cells_out) > kSurely) continue;
+                    const openvdb::Coord at = value.getCoord();
+                    value.setValue(
+                        static_cast<float>(distance({origin[0] + cell * at.x(), origin[1] + cell * at.y(),
+                                                     origin[2] + cell * at.z()}) /
+                                           cell));
+                }
+        });
+        result = surface_at(context, *grid, cells_out, 0, origin, cell);
     });
     return result;
 }

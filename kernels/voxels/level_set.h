@@ -38,13 +38,19 @@ struct OffsetSurfaceOptions {
     double cell_mm = 0.5;
 };
 
+/// The distance of a point from the facets of a mesh, mm, without a sign. Called from many threads at once.
+using DistanceField = std::function<double(const std::array<double, 3>&)>;
+
 /// The points outside of a solid at this distance from its facets. On the grid distances are exact; between
-/// its points the surface may lie nearer by some cell² / (8·distance), and in creases farther by a third of a
+/// its points the surface may lie nearer by 3·cell² / (8·distance), and in creases farther by a third of a
 /// cell: what is asked of it must be measured on it. Deterministic. Some 8 bytes for each cell of the band
 /// between solid and surface, which the caller charges.
 /// @param mesh closed. Where it crosses itself its inner walls lie inside
+/// @param distance from the mesh. OpenVDB's own, several cells from it, is that of facets which are nearest
+/// to cells beside, and by up to half a cell too great
 /// @returns a closed surface with vertices and facets, no neighbours
 /// @throws Error(cancelled)
-[[nodiscard]] Mesh offset_surface(Context& context, MeshView mesh, const OffsetSurfaceOptions& options);
+[[nodiscard]] Mesh offset_surface(Context& context, MeshView mesh, const DistanceField& distance,
+                                  const OffsetSurfaceOptions& options);
 
 }  // namespace slabwright
