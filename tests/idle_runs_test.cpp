@@ -196,27 +196,45 @@ Made made(const std::vector<std::array<Vec3f, 3>>& facets) {
     return made;
 }
 
+std::vector<std::array<Vec3f, 3>> ridge(double degrees) {
+    const double rise = 12, run = rise / std::tan(degrees * std::numbers::pi / 180);
+    return prism({{0, 0},
+                  {0, 4},
+                  {10, 4},
+                  {10 + run, 4 + rise},
+                  {14 + run, 4 + rise},
+                  {14 + 2 * run, 4},
+                  {24 + 2 * run, 4},
+                  {24 + 2 * run, 0}},
+                 40);
+}
+
 // Slopes at the limit between level contours and raster belong to both: one of them makes them.
 TEST(IdleRuns, SlopesAtTheLimitAreCutOnce) {
-    const auto ridge = [](double degrees) {
-        const double rise = 12, run = rise / std::tan(degrees * std::numbers::pi / 180);
-        return made(prism({{0, 0},
-                           {0, 4},
-                           {10, 4},
-                           {10 + run, 4 + rise},
-                           {14 + run, 4 + rise},
-                           {14 + 2 * run, 4},
-                           {24 + 2 * run, 4},
-                           {24 + 2 * run, 0}},
-                          40));
-    };
-    const Made gentle = ridge(40), at_limit = ridge(45.5), steep = ridge(51);
+    const Made gentle = made(ridge(40)), at_limit = made(ridge(45.5)), steep = made(ridge(51));
     for (const Made& one : {gentle, at_limit, steep}) {
         EXPECT_TRUE(one.violations.empty()) << one.violations.front();
         EXPECT_LT(one.missed_mm2, 8) << "more than along the ridge's feet";
     }
     EXPECT_LT(at_limit.finish_mm, 1.25 * std::max(gentle.finish_mm, steep.finish_mm))
         << gentle.finish_mm << ' ' << at_limit.finish_mm << ' ' << steep.finish_mm;
+}
+
+// A flat end mill that goes along the foot of a slope leaves no stairs there, though they be narrower than a
+// cell of the stock.
+TEST(IdleRuns, FeetOfSlopesAreCutWithoutStairs) {
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution between(40.0, 75.0);
+    for (int k = 0; k < 6; ++k) {
+        const double degrees = between(random);
+        std::vector<std::array<Vec3f, 3>> facets = ridge(degrees);
+        if (k % 2 == 1)
+            for (auto& facet : facets)
+                for (Vec3f& v : facet) v = {-v.y, v.x, v.z};
+        const Made one = made(facets);
+        EXPECT_TRUE(one.violations.empty()) << degrees << ": " << one.violations.front();
+        EXPECT_LT(one.missed_mm2, 8) << degrees;
+    }
 }
 
 // Slots that only the ball enters, wherever their walls lie among the cells: nothing of what its

@@ -1,63 +1,38 @@
-// A raster of drops over what is left, refined where the cutter's rest jumps and something stands that could
-// be lowered there; of all places only those are kept that lower the stock, and finer lines are laid over
-// what coarser ones leave. So a wide rest is cleared by an even raster, and a corner by the few places along
-// it.
+// How the lines of a rest pass are travelled: of all places only those that lower the stock, in runs along
+// the surface, and in steps from above where waste is deep.
 #include "engine/paths/operations/rest.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
-#include <numeric>
-#include <optional>
 
-#include "engine/paths/operations/rest_places.h"
+#include "engine/paths/operations/rest_lines.h"
 #include "engine/paths/operations/roughing.h"
 #include "engine/paths/operations/semi_rough.h"
 #include "engine/paths/runs/chains.h"
 #include "engine/paths/runs/rings.h"
 #include "engine/paths/runs/tolerances.h"
 #include "kernels/cutting/drop.h"
-#include "kernels/parallel/parallel.h"
 
 namespace slabwright {
 
 namespace {
 
-constexpr double kSettle = 0.01;  // mm by which a low point of a line lies under its neighbours
-constexpr float kMuch = 0.25F;    // mm left that are worth a search for a place (probe)
-constexpr double kProbed = 1.0;   // mm: of squares of this side one cell is
-constexpr int kProbes = 32;       // places around it
 constexpr double kOver = 0.005;  // mm by which a straight way may leave the places between its ends, and cut,
 constexpr double kOverShare = 0.25;  // and what share of the gouge tolerance
 constexpr double kSteepestWay = 3;   // slope up which it goes straight; up walls by steps
 constexpr double kBridge = 3.0;      // mm between two useful stretches that are travelled along the surface
 
-struct Line {
-    std::int32_t y = 0;
-    std::vector<RestPlace> places;
-};
-
-class RestPaths : private RestPlaces {
+class RestPaths : private RestLines {
 public:
-    using RestPlaces::RestPlaces;
+    using RestLines::RestLines;
 
     Operation run() {
         Operation op = cut_.operation(pass_.kind, pass_.purpose, tool_);
         op.spare = pass_.allowance;
         if (targets_.count() == 0) return op;
-        find_room();
-        index_ = &cut_.drops(dropped());
-        {
-            LayerStock::Trial places(stock_);  // the stock stands as before when its lines are known
-            lay_lines();
-            settle();
-            if (!(pass_.allowance > 0))
-                probe();  // the pass after one that keeps off the walls is the one for narrow slots
-            places.undo();
-        }
+        lay();
         std::vector<std::vector<PathPoint>> runs;
-        for (const Line& line : lines_) {
+        for (const RestLine& line : lines_) {
             cut_.context.throw_if_cancelled();
             append_runs(line, runs);
         }
@@ -70,237 +45,6 @@ public:
     }
 
 private:
-    // The cutter, thicker all around by what is kept off walls; a flat end mill on its side alone.
-    [[nodiscard]] CutterShape dropped() const {
-        if (!ball_) return flat_cutter(wide_);
-        if (!has_taper(tool_.kind)) return ball_cutter(wide_);
-        return {r_ + pass_.allowance, wide_, cutter_shape(tool_).taper_rad};
-    }
-
-    void append_between(std::vector<Place>& line, std::int32_t y, Place b, MetPoints& met) const {
-        if (!line.empty() && b.x - line.back().x <= step_ && b.x - line.back().x > 2 * finest_ &&
-            (too_far(line.back(), b, 0) || too_steep(line.back(), b))) {
-            append_between(line, y, place(line.back().x + (b.x - line.back().x) / 2, y, met), met);
-            append_between(line, y, b, met);
-            return;
-        }
-        line.push_back(b);
-    }
-
-    static const Place* at(const Line& line, std::int32_t x) {
-        const auto it = std::lower_bound(line.places.begin(), line.places.end(), x,
-                                         [](const Place& p, std::int32_t v) { return p.x < v; });
-        return it != line.places.end() && it->x == x ? &*it : nullptr;
-    }
-
-    // An even raster over the targets, then lines between its lines where the rest jumps from one to the
-    // next.
-    void lay_lines() {
-        const CellGrid& grid = stock_.grid();
-        const auto [first, last] = targets_.rows();
-        spacing_ = std::max(1, to_units(pass_.in_steps ? 0.7 * tip_r_
-                                        : ball_        ? std::sqrt(8 * tip_r_ * cut_.job.tolerances.cusp)
-                                                       : std::min(1.0, r_ / 4)));
-        const auto low = static_cast<std::int32_t>(std::floor((grid.y(first) - r_) * kUnitsPerMm / spacing_)),
-                   high = static_cast<std::int32_t>(std::ceil((grid.y(last) + r_) * kUnitsPerMm / spacing_));
-        const double y_low = cut_.low(1, r_), y_high = cut_.high(1, r_);
-        std::vector<Line> even;
-        for (std::int32_t k = low; k <= high; ++k)
-            if (to_mm(k * spacing_) >= y_low && to_mm(k * spacing_) <= y_high)
-                even.push_back({k * spacing_, {}});
-        const double x_low = cut_.low(0, r_), x_high = cut_.high(0, r_);
-        // A place that helps may lie between the last line that covers a target and the next, which is looked
-        // at only where both have places.
-        const double covers = pass_.in_steps ? r_ : r_ + to_mm(spacing_);
-        parallel_each(cut_.context, even.size(), [&](std::size_t l) {
-            MetPoints met;
-            for (const auto& span : targets_.around(to_mm(even[l].y), covers, x_low, x_high)) {
-                const std::int32_t from =
-                                       (span[0] >= 0 ? span[0] / step_ : -((-span[0] + step_ - 1) / step_)),
-                                   to = span[1] / step_ + 1;
-                for (std::int32_t k = from; k <= to; ++k) {
-                    if (!even[l].places.empty() && k * step_ <= even[l].places.back().x) continue;
-                    append_between(even[l].places, even[l].y, place(k * step_, even[l].y, met), met);
-                }
-            }
-        });
-        keep_what_lowers(even);
-        lines_ = std::move(even);
-        // What the lines so far leave decides where the next ones go.
-        std::vector<std::array<std::size_t, 2>> neighbours;
-        for (std::size_t l = 0; l + 1 < lines_.size(); ++l) neighbours.push_back({l, l + 1});
-        while (!neighbours.empty()) {
-            std::vector<Line> middles(neighbours.size());
-            parallel_each(cut_.context, neighbours.size(), [&](std::size_t n) {
-                middles[n] = middle(lines_[neighbours[n][0]], lines_[neighbours[n][1]]);
-            });
-            keep_what_lowers(middles);
-            std::vector<std::array<std::size_t, 2>> next;
-            for (std::size_t n = 0; n < neighbours.size(); ++n) {
-                if (middles[n].places.empty()) continue;
-                next.push_back({neighbours[n][0], lines_.size()});
-                next.push_back({lines_.size(), neighbours[n][1]});
-                lines_.push_back(std::move(middles[n]));
-            }
-            neighbours = std::move(next);
-        }
-    }
-
-    // Whether a line ends at a place of a flat end mill, or is stopped by a wall there, short of something
-    // that stands: in a channel that narrows a line between it and the next goes on.
-    [[nodiscard]] bool ends(const Place& p, const Line& line) const {
-        if (ball_ || !p.reachable) return false;
-        const auto goes_on = [&](std::int32_t x) {
-            const Place* next = at(line, x);
-            return next && next->tip <= p.tip + kJump;
-        };
-        return !(goes_on(p.x - step_) && goes_on(p.x + step_)) &&
-               lowers(to_mm(p.x), to_mm(p.y), p.tip, to_mm(step_));
-    }
-
-    // A line between two, over what is too far from one to the other; without places where nothing is.
-    [[nodiscard]] Line middle(const Line& a, const Line& b) const {
-        Line line{a.y + (b.y - a.y) / 2, {}};
-        if (b.y - a.y < 2 * finest_) return line;
-        std::vector<std::int32_t> over;
-        for (const Place& p : a.places) {
-            if (p.x % step_ != 0) continue;
-            if (const Place* other = at(b, p.x);
-                (other && too_far(p, *other, to_mm(step_) / 2)) || ends(p, a))
-                over.push_back(p.x);
-        }
-        for (const Place& p : b.places)
-            if (p.x % step_ == 0 && ends(p, b)) over.push_back(p.x);
-        std::sort(over.begin(), over.end());
-        MetPoints met;
-        for (const std::int32_t middle : over)
-            for (const std::int32_t x : {middle - step_, middle, middle + step_})
-                if (line.places.empty() || x > line.places.back().x)
-                    append_between(line.places, line.y, place(x, line.y, met), met);
-        return line;
-    }
-
-    // Where the cutter sinks deepest between walls (a slot hardly wider than itself, a hole narrower, the
-    // meeting of three faces) no raster hits the place: from where a line, or the lines beside it, are higher
-    // on both sides it slides down to where it rests on all sides. What lies in a row is travelled as a line.
-    void settle() {
-        std::vector<std::size_t> by_y(lines_.size());
-        std::iota(by_y.begin(), by_y.end(), std::size_t{0});
-        std::sort(by_y.begin(), by_y.end(), [&](std::size_t a, std::size_t b) {
-            return std::pair(lines_[a].y, a) < std::pair(lines_[b].y, b);
-        });
-        // A place past a wall's foot that only the layer's bottom keeps as high is no wall.
-        auto higher = [&](const Place* beside, const Place& p) {
-            return beside && (beside->touches || !beside->reachable) && p.tip < beside->tip - kSettle;
-        };
-        // Up to the next line of the even raster: lines between may not come by here.
-        auto beside = [&](std::size_t rank, bool after, std::int32_t x) -> const Place* {
-            const std::int32_t y = lines_[by_y[rank]].y;
-            for (std::size_t k = rank; after ? k + 1 < by_y.size() : k > 0;) {
-                const Line& line = lines_[by_y[after ? ++k : --k]];
-                if (std::abs(line.y - y) > spacing_) break;
-                if (const Place* p = at(line, x)) return p;
-            }
-            return nullptr;
-        };
-        std::vector<std::vector<Line>> found(lines_.size());
-        parallel_each(cut_.context, lines_.size(), [&](std::size_t rank) {
-            const std::size_t l = by_y[rank];
-            const std::vector<Place>& places = lines_[l].places;
-            for (std::size_t i = 0; i < places.size(); ++i) {
-                const Place& p = places[i];
-                if (!p.reachable) continue;
-                const bool in_line = i > 0 && i + 1 < places.size() &&
-                                     places[i + 1].x - places[i - 1].x <= 2 * step_ &&
-                                     higher(&places[i - 1], p) && higher(&places[i + 1], p);
-                const bool across = !in_line && p.x % step_ == 0 && higher(beside(rank, false, p.x), p) &&
-                                    higher(beside(rank, true, p.x), p);
-                if (!in_line && !across) continue;
-                const Place low = slide(p);
-                if (!low.useful) continue;
-                std::vector<Line>& lines = found[l];
-                if (!lines.empty() && apart(lines.back().places.back(), low) <= chord_ * kUnitsPerMm)
-                    lines.back().places.push_back(low);
-                else lines.push_back({low.y, {low}});
-            }
-        });
-        std::vector<Line> all;
-        for (std::size_t rank = 0; rank < by_y.size(); ++rank)
-            for (Line& line : found[by_y[rank]]) all.push_back(std::move(line));
-        keep_what_lowers(all);
-        for (Line& line : all) lines_.push_back(std::move(line));
-    }
-
-    // A slot so narrow that the raster's places on both sides of it stand on its walls' tops, which are
-    // level, shows nowhere. Where much is left, a flat end mill is held with its rim over it, all around, and
-    // slides down from where it is lowest. A ball slides from over what is left: where its places on a slot's
-    // walls lie over all that still stands, the raster has not looked at them.
-    void probe() {
-        const std::array<int, 2> rows = targets_.rows();
-        const int first = rows[0], last = rows[1];
-        if (first > last) return;
-        const CellGrid& grid = stock_.grid();
-        const int side =
-            std::max(1, static_cast<int>(kProbed / grid.cell));  // cells of a square, of which one is probed
-        const double much = std::max(double{kMuch}, pass_.limit);
-        const double beside = r_ - 0.7 * grid.cell, x_low = cut_.low(0, r_), x_high = cut_.high(0, r_),
-                     y_low = cut_.low(1, r_), y_high = cut_.high(1, r_);
-        std::vector<std::vector<Line>> found(static_cast<std::size_t>((last - first) / side + 1));
-        parallel_each(cut_.context, found.size(), [&](std::size_t b) {
-            cut_.context.throw_if_cancelled();
-            std::vector<std::array<int, 2>> cells;  // one of each square
-            std::vector<char> taken(static_cast<std::size_t>(grid.nx / side + 1), 0);
-            const int row = first + static_cast<int>(b) * side;
-            for (int j = row; j <= std::min(last, row + side - 1); ++j)
-                for (const auto& [begin, end] : targets_.row(j))
-                    for (int i = begin; i <= end; ++i) {
-                        char& square = taken[static_cast<std::size_t>(i / side)];
-                        if (square == 0 && static_cast<double>(stock_.left(grid.index(i, j))) > much)
-                            square = 1, cells.push_back({i, j});
-                    }
-            MetPoints met;
-            for (const auto& [i, j] : cells) {
-                Place lowest;
-                lowest.tip = std::numeric_limits<double>::infinity();
-                const int probes = ball_ ? 1 : kProbes;
-                const double off = ball_ ? 0 : beside;
-                for (int k = 0; k < probes; ++k) {
-                    const double turn = 2 * std::numbers::pi * k / probes,
-                                 x = grid.x(i) + off * std::cos(turn), y = grid.y(j) + off * std::sin(turn);
-                    if (x < x_low || x > x_high || y < y_low || y > y_high) continue;
-                    const Place p = place(to_units(x), to_units(y), met, true);
-                    if (p.reachable && p.tip < lowest.tip) lowest = p;
-                }
-                if (std::isinf(lowest.tip)) continue;
-                if (const Place low = lowest.useful ? lowest : slide(lowest); low.useful)
-                    found[b].push_back({low.y, {low}});
-            }
-        });
-        std::vector<Line> all;
-        for (std::vector<Line>& lines : found)
-            for (Line& line : lines) all.push_back(std::move(line));
-        keep_what_lowers(all);
-        for (Line& line : all) lines_.push_back(std::move(line));
-    }
-
-    static double apart(const Place& a, const Place& b) {
-        return std::hypot(static_cast<double>(a.x) - b.x, static_cast<double>(a.y) - b.y);
-    }
-
-    // What a place no longer lowers after those before it is not visited.
-    void keep_what_lowers(std::vector<Line>& lines) {
-        for (Line& line : lines) {
-            cut_.context.throw_if_cancelled();
-            for (Place& p : line.places) {
-                if (!p.useful) continue;
-                p.useful = false;
-                if (!lowers(to_mm(p.x), to_mm(p.y), p.tip)) continue;
-                p.cut = true;
-                stock_.cut_at(end_, to_mm(p.x), to_mm(p.y), p.tip);
-            }
-        }
-    }
-
     // Straight up is always free, and so is a level chord of safe length at the height of the higher rest.
     void append(std::vector<PathPoint>& points, PathPoint p) const {
         if (!points.empty()) {
@@ -317,7 +61,7 @@ private:
         points.push_back(p);
     }
 
-    void append_runs(const Line& line, std::vector<std::vector<PathPoint>>& runs) const {
+    void append_runs(const RestLine& line, std::vector<std::vector<PathPoint>>& runs) const {
         std::vector<Place> run;
         std::size_t last_cut = 0;
         const Place* before = nullptr;
@@ -452,9 +196,6 @@ private:
         }
         path.finish();
     }
-
-    std::int32_t spacing_ = 0;
-    std::vector<Line> lines_;
 };
 
 }  // namespace

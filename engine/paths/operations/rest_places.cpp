@@ -135,16 +135,24 @@ RestPlace RestPlaces::place(std::int32_t ux, std::int32_t uy, MetPoints& met, bo
     return p;
 }
 
+RestPlace RestPlaces::on_line(const LineDirection& direction, std::int32_t along, std::int32_t across,
+                              MetPoints& met) const {
+    const auto [x, y] = direction.place(along, across);
+    Place p = place(x, y, met);
+    p.along = along;
+    return p;
+}
+
 double RestPlaces::lowest_between(const Place& a, const Place& b, double beside) const {
     double lowest = std::max(cut_.layer.floor_below, -std::numeric_limits<double>::max());
-    const double along_x = a.y < b.y ? beside : 0, along_y = a.y < b.y ? 0 : beside;
-    const double x0 = to_mm(std::min(a.x, b.x)) - along_x, x1 = to_mm(std::max(a.x, b.x)) + along_x,
-                 y0 = to_mm(std::min(a.y, b.y)) - along_y, y1 = to_mm(std::max(a.y, b.y)) + along_y;
+    const double ax = to_mm(a.x), ay = to_mm(a.y), way = std::hypot(to_mm(b.x) - ax, to_mm(b.y) - ay);
+    const double c = way > 0 ? (to_mm(b.x) - ax) / way : 1, s = way > 0 ? (to_mm(b.y) - ay) / way : 0;
     for (const Place* p : {&a, &b}) {
         if (!p->touches) continue;
-        const double dx = std::max(std::abs(x0 - p->contact[0]), std::abs(x1 - p->contact[0])),
-                     dy = std::max(std::abs(y0 - p->contact[1]), std::abs(y1 - p->contact[1])),
-                     over2 = wide_ * wide_ - dx * dx - dy * dy;
+        const double x = p->contact[0] - ax, y = p->contact[1] - ay, along = c * x + s * y,
+                     ahead = std::max(std::abs(along), std::abs(way - along)),
+                     aside = std::abs(c * y - s * x) + beside,
+                     over2 = wide_ * wide_ - ahead * ahead - aside * aside;
         if (over2 > 0) lowest = std::max(lowest, p->contact[2] + std::sqrt(over2) - wide_ + under_);
     }
     return lowest;
@@ -152,7 +160,7 @@ double RestPlaces::lowest_between(const Place& a, const Place& b, double beside)
 
 bool RestPlaces::too_far(const Place& a, const Place& b, double beside) const {
     if (!a.reachable && !b.reachable) return false;
-    const double apart = to_mm(std::max(std::abs(b.x - a.x), std::abs(b.y - a.y)));
+    const double apart = std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y));
     if (!ball_) {
         if (std::abs(a.tip - b.tip) <= kJump) return false;
         if (a.useful || b.useful) return true;
@@ -172,7 +180,8 @@ bool RestPlaces::too_far(const Place& a, const Place& b, double beside) const {
 }
 
 bool RestPlaces::too_steep(const Place& a, const Place& b) const {
-    if (!ball_ || !(a.useful || b.useful) || b.x - a.x <= finest_step_ || !a.reachable || !b.reachable)
+    if (!ball_ || !(a.useful || b.useful) || b.along - a.along <= finest_step_ || !a.reachable ||
+        !b.reachable)
         return false;
     return std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(a.y) - to_mm(b.y), a.tip - b.tip) > chord_;
 }

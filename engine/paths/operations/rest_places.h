@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/paths/operations/rest.h"
+#include "engine/paths/operations/rest_directions.h"
 #include "engine/paths/operations/rest_targets.h"
 #include "kernels/cutting/drop.h"
 
@@ -14,10 +15,12 @@ namespace slabwright {
 /// A place of the cutter on the surface.
 struct RestPlace {
     std::int32_t x = 0, y = 0, z = 0;  // 0.1 µm
+    std::int32_t along = 0;            // 0.1 µm, on its line
     double tip = 0;  // mm; of a ball's place that lies over all that stands near, that height: it lies as
                      // high or higher
     std::array<double, 3> contact{};  // mm, where `touches`: a point of the surface
     bool reachable = false, touches = false, useful = false, cut = false;
+    bool stair = false;  // between two others it takes off a stair
 };
 
 /// Places of one cutter in one pass: how deep it goes, whether something is lowered there, whether places
@@ -46,9 +49,13 @@ protected:
     /// @param high also where a ball lies over all that stands for it
     [[nodiscard]] Place place(std::int32_t ux, std::int32_t uy, MetPoints& met, bool high = false) const;
 
-    /// No higher than a ball's tip anywhere in the rectangle between two places and `beside` (mm) to their
-    /// sides: where it touched at either of them keeps it up, the less the farther away it is, and nothing of
-    /// a rectangle is farther away than one of its corners.
+    /// The place on a line, 0.1 µm along it.
+    [[nodiscard]] Place on_line(const LineDirection& direction, std::int32_t along, std::int32_t across,
+                                MetPoints& met) const;
+
+    /// No higher than a ball's tip anywhere in the rectangle from one place to another and `beside` (mm) to
+    /// the sides of that way: where it touched at either of them keeps it up, the less the farther away it
+    /// is, and nothing of a rectangle is farther away than one of its corners.
     [[nodiscard]] double lowest_between(const Place& a, const Place& b, double beside) const;
 
     /// Whether places between these two are worth a look, and `beside` (mm) to their sides.

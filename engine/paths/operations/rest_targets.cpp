@@ -86,25 +86,4 @@ void RestTargets::find_highest(double reach) {
         }
 }
 
-Spans RestTargets::around(double y, double radius, double x_low, double x_high) const {
-    const CellGrid& grid = stock_.grid();
-    const int j0 = std::max(0, static_cast<int>(std::ceil((y - radius - grid.y0) / grid.cell)));
-    const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + radius - grid.y0) / grid.cell)));
-    Spans all;
-    for (int j = j0; j <= j1; ++j) {
-        const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, radius * radius - dy * dy));
-        for (const auto& run : rows_[static_cast<std::size_t>(j)]) {
-            const double low = std::max(grid.x(run[0]) - w, x_low),
-                         high = std::min(grid.x(run[1]) + w, x_high);
-            if (low < high) all.push_back({to_units(low), to_units(high)});
-        }
-    }
-    std::sort(all.begin(), all.end());
-    Spans merged;
-    for (const auto& s : all)
-        if (!merged.empty() && s[0] <= merged.back()[1]) merged.back()[1] = std::max(merged.back()[1], s[1]);
-        else merged.push_back(s);
-    return merged;
-}
-
 }  // namespace slabwright

@@ -16,13 +16,13 @@
 
 namespace slabwright {
 
-/// Stretches of a line.
-using Spans = std::vector<std::array<std::int32_t, 2>>;  // 0.1 µm, ascending and disjoint
-
 // The greatest number under a height: what stands over it is as high or higher.
 inline double just_under(double z) { return std::nextafter(z, -std::numeric_limits<double>::infinity()); }
 
-// The cells worth a visit, row by row, and the stretches of a line from which a cutter covers some of them.
+/// Of a row of cells, first and last of each run.
+using CellRuns = std::vector<std::array<int, 2>>;
+
+// The cells worth a visit, row by row.
 class RestTargets {
 public:
     /// @param probe a flat cutter as wide as the limit, or less: where its rest is as high as what stands,
@@ -75,12 +75,9 @@ public:
         while (last >= first && rows_[static_cast<std::size_t>(last)].empty()) --last;
         return {first, last};
     }
-    /// The marked cells of a row, first and last of each run.
-    [[nodiscard]] std::span<const std::array<int, 2>> row(int j) const {
-        return rows_[static_cast<std::size_t>(j)];
-    }
-    /// The stretches of a line from which a cutter covers some of them, between two ends, mm.
-    [[nodiscard]] Spans around(double y, double radius, double x_low, double x_high) const;
+    /// The marked cells of a row, and of all.
+    [[nodiscard]] const CellRuns& row(int j) const { return rows_[static_cast<std::size_t>(j)]; }
+    [[nodiscard]] std::span<const CellRuns> all_rows() const { return rows_; }
 
 private:
     void find_highest(double reach);
@@ -93,7 +90,7 @@ private:
         float highest = kNone;     // when they were marked: cutting only lowers them
     };
     const LayerStock& stock_;
-    std::vector<std::vector<std::array<int, 2>>> rows_;
+    std::vector<CellRuns> rows_;
     std::size_t count_ = 0, tiles_x_ = 0;
     std::vector<Tile> tiles_;
     std::vector<float> highest_;  // by tile

@@ -1,0 +1,185 @@
+// Lines of rest passes lie along what is to be lowered, and cover all of it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "engine/paths/operations/rest.h"
+#include "engine/paths/operations/rest_directions.h"
+#include "engine/paths/operations/roughing.h"
+#include "engine/stock/layer_stock.h"
+#include "tests/support/end_mill_job.h"
+#include "tests/support/height_field.h"
+#include "tests/support/seed.h"
+
+namespace slabwright {
+namespace {
+
+const CellGrid kGrid{-31.3, 17.7, 0.2, 400, 300};
+
+std::vector<CellRuns> rows_of(const auto& is_target) {
+    std::vector<CellRuns> rows(static_cast<std::size_t>(kGrid.ny));
+    for (int j = 0; j < kGrid.ny; ++j)
+        for (int i = 0; i < kGrid.nx; ++i) {
+            if (!is_target(kGrid.x(i), kGrid.y(j))) continue;
+            CellRuns& row = rows[static_cast<std::size_t>(j)];
+            if (!row.empty() && row.back()[1] + 1 == i) row.back()[1] = i;
+            else row.push_back({i, i});
+        }
+    return rows;
+}
+
+/// Whether the line of a place (0.1 µm along it and across it) covers it: within a stretch, to a unit.
+bool lies_in(const Spans& spans, double along) {
+    return std::any_of(spans.begin(), spans.end(), [&](const auto& s) {
+        return along * kUnitsPerMm >= s[0] - 1 && along * kUnitsPerMm <= s[1] + 1;
+    });
+}
+
+TEST(RestDirections, BandsAreFollowed) {
+    Context context({.threads = 2});
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> turn(0, std::numbers::pi), offset(-5, 5), wide(0.4, 2);
+    for (int trial = 0; trial < 40; ++trial) {
+        const double angle = turn(random), c = std::cos(angle), s = std::sin(angle), at = offset(random),
+                     w = wide(random), x0 = kGrid.x(200), y0 = kGrid.y(150);
+        const std::vector<CellRuns> rows = rows_of([&](double x, double y) {
+            return std::abs(-s * (x - x0) + c * (y - y0) - at) < w / 2 &&
+                   std::abs(c * (x - x0) + s * (y - y0)) < 20;
+        });
+        const RestDirections directions(context, kGrid, rows, 3);
+        for (std::size_t d = 0; d < directions.all().size(); ++d) {
+            const LineDirection& line = directions.all()[d];
+            const double off = std::abs(std::remainder(std::atan2(line.s, line.c) - angle, std::numbers::pi));
+            const auto [low, high] = directions.across(d);
+            // Eight directions lie 18 to 27 degrees apart; along x is kept where others are not much longer.
+            if (off > (d == 0 ? 0.6 : 0.42)) {
+                EXPECT_GT(low, high) << trial << ": " << angle << ' ' << line.p << ' ' << line.q;
+            }
+        }
+    }
+}
+
+TEST(RestDirections, WideAreasAreCrossedAlongX) {
+    Context context({.threads = 2});
+    const std::vector<CellRuns> rows =
+        rows_of([&](double x, double y) { return std::hypot(x - kGrid.x(200), y - kGrid.y(150)) < 20; });
+    const RestDirections directions(context, kGrid, rows, 3);
+    for (std::size_t d = 1; d < directions.all().size(); ++d)
+        EXPECT_GT(directions.across(d)[0], directions.across(d)[1]) << d;
+}
+
+/// Every target lies in the stretches of all lines of one direction that pass it no farther than the radius,
+/// and nothing else does.
+TEST(RestDirections, StretchesCoverEveryTarget) {
+    Context context({.threads = 2});
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> shape(0.2, 1), aside(-1, 1);
+    const double radius = 2.5;
+    std::size_t turned = 0;
+    for (int trial = 0; trial < 10; ++trial) {
+        const double a = 6 + 4 * shape(random), b = 0.4 + 0.4 * shape(random), w = shape(random);
+        // Winding bands, whose directions change.
+        const auto is_target = [&](double x, double y) {
+            return std::abs(std::remainder(y + a * std::sin(b * x), 15)) < w && x + y < 60;
+        };
+        const std::vector<CellRuns> rows = rows_of(is_target);
+        const RestDirections directions(context, kGrid, rows, radius);
+        for (std::size_t d = 1; d < directions.all().size(); ++d)
+            turned += directions.across(d)[0] <= directions.across(d)[1] ? 1 : 0;
+        const std::array<double, 2> ends{-1000, 1000};
+        for (int j = 0; j < kGrid.ny; j += 7)
+            for (int i = 0; i < kGrid.nx; i += 5) {
+                if (!is_target(kGrid.x(i), kGrid.y(j))) continue;
+                std::size_t covering = 0;
+                for (std::size_t d = 0; d < directions.all().size(); ++d) {
+                    const LineDirection& line = directions.all()[d];
+                    const double along = line.c * kGrid.x(i) + line.s * kGrid.y(j),
+                                 across = line.c * kGrid.y(j) - line.s * kGrid.x(i);
+                    const auto [low, high] = directions.across(d);
+                    if (across < low - 1e-6 || across > high + 1e-6) continue;
+                    const double beside = aside(random) * 0.99 * radius,
+                                 reach = std::sqrt(radius * radius - beside * beside) - 1e-3;
+                    const Spans spans = directions.around(d, across + beside, radius, ends);
+                    covering += lies_in(spans, along - reach) && lies_in(spans, along) &&
+                                        lies_in(spans, along + reach)
+                                    ? 1
+                                    : 0;
+                }
+                EXPECT_GE(covering, 1U) << trial << ": " << i << ' ' << j;
+            }
+    }
+    EXPECT_GT(turned, 3U) << "directions of ten trials, but for those along x";
+}
+
+TEST(RestDirections, LinesEndAtTheBorder) {
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> place(-40, 40);
+    for (const auto& [p, q] : {std::array{1, 0}, {2, 1}, {0, 1}, {-1, 1}}) {
+        const double far = std::hypot(p, q);
+        const LineDirection line{p, q, p / far, q / far};
+        for (int trial = 0; trial < 200; ++trial) {
+            const double along = place(random), across = place(random), x = line.c * along - line.s * across,
+                         y = line.s * along + line.c * across;
+            const auto ends = line.within(across, {-20, 10}, {-5, 25});
+            EXPECT_EQ(along >= ends[0] && along <= ends[1], x >= -20 && x <= 10 && y >= -5 && y <= 25);
+            const auto at = line.place(to_units(along), to_units(across));
+            EXPECT_NEAR(at[0], x * kUnitsPerMm, 2);
+            EXPECT_NEAR(at[1], y * kUnitsPerMm, 2);
+        }
+    }
+}
+
+/// Moves by which a flat end mill clears the feet of a groove that is turned.
+std::size_t moves_along_groove(double degrees) {
+    const double c = std::cos(degrees * std::numbers::pi / 180),
+                 s = std::sin(degrees * std::numbers::pi / 180), top = 14;
+    Context context;
+    const Job job = test::end_mill_job();
+    const Mesh mesh = test::height_field(context, 160, 0.25, [&](double x, double y) {
+        const double across = std::abs(c * y - s * x);
+        return 4 + std::clamp(1.6 * (across - 4), 0.0, 8.0);
+    });
+    LayerJob layer;
+    Standing standing{{-25, -25}, {25, 25}, top};
+    LayerCut cut{context,
+                 layer,
+                 job,
+                 layer_solid(context, mesh.view(), 0, top),
+                 top,
+                 {},
+                 alpha_map(context, mesh.view(), 0, top),
+                 nullptr,
+                 {}};
+    layer.mesh = mesh.view();
+    layer.job = &job;
+    layer.z_bottom = 0;
+    layer.z_top = layer.slab_thickness = top;
+    layer.stock_min = {-25, -25};
+    layer.stock_max = {25, 25};
+    layer.tools.rough = tool_of_kind(job, ToolKind::flat);
+    layer.tools.finish = tool_of_kind(job, ToolKind::ball);
+    cut.standing = &standing;
+    LayerStock stock(context, cut.layer, cut.solid, 0.2);
+    stock.cut(context, rough_layer(cut).back(), layer.tools.rough);
+    Tool ball = layer.tools.finish, flat = ball;
+    flat.kind = ToolKind::flat;
+    (void)cut_rest(cut, stock, ball, {OperationKind::finish, "what is left", 0.07, false});
+    const Operation op = cut_rest(cut, stock, flat, {OperationKind::corner, "corners", 0.07, false});
+    return op.moves.size();
+}
+
+TEST(RestDirections, GroovesAreClearedAlongThem) {
+    const auto along_x = static_cast<double>(moves_along_groove(0));
+    EXPECT_GT(along_x, 100);
+    // Across it they are short: 3.1 and twice as many. (The other diagonal is across those of the mesh.)
+    for (const double degrees : {45.0, 90.0})
+        EXPECT_LT(static_cast<double>(moves_along_groove(degrees)), 1.7 * along_x) << degrees;
+}
+
+}  // namespace
+}  // namespace slabwright
