@@ -18,9 +18,8 @@ using Spans = std::vector<std::array<std::int32_t, 2>>;  // 0.1 µm, ascending a
 /// Lines that go p cells to the right and q up. A place has a coordinate along its line and one across, the
 /// line's own, both in 0.1 µm; (along, across) turned by the direction is (x, y).
 struct LineDirection {
-    int p = 1, q = 0;  // without a common divisor, q ≥ 0
-    double c = 1,
-           s = 0;  // the direction's cosine and sine
+    int p = 1, q = 0;     // without a common divisor, q ≥ 0
+    double c = 1, s = 0;  // its cosine and sine
 
     /// @returns x, y, 0.1 µm
     [[nodiscard]] std::array<std::int32_t, 2> place(std::int32_t along, std::int32_t across) const;
