@@ -30,7 +30,7 @@ protected:
     void lay();
 
     /// 0.1 µm in plan.
-    static double apart(const Place& a, const Place& b);
+    static double apart(const RestPlace& a, const RestPlace& b);
 
     std::int32_t spacing_ = 0;  // 0.1 µm, of the even raster
     std::vector<RestLine> lines_;
@@ -39,11 +39,11 @@ private:
     // The cutter, thicker all around by what is kept off walls; a flat end mill on its side alone.
     [[nodiscard]] CutterShape dropped() const;
 
-    void append_between(RestLine& line, Place b, MetPoints& met) const;
+    void append_between(RestLine& line, RestPlace b, MetPoints& met) const;
 
-    [[nodiscard]] Place on(const RestLine& line, std::int32_t along, MetPoints& met) const;
+    [[nodiscard]] RestPlace on(const RestLine& line, std::int32_t along, MetPoints& met) const;
 
-    static const Place* at(const RestLine& line, std::int32_t along);
+    static const RestPlace* at(const RestLine& line, std::int32_t along);
 
     // In each direction an even raster over its targets, then lines between its lines where the rest jumps
     // from one to the next.
@@ -56,16 +56,16 @@ private:
 
     // Whether a line ends at a place of a flat end mill, or is stopped by a wall there, short of something
     // that stands: in a channel that narrows a line between it and the next goes on.
-    [[nodiscard]] bool ends(const Place& p, const RestLine& line) const;
+    [[nodiscard]] bool ends(const RestPlace& p, const RestLine& line) const;
 
     // How steeply the places of a line rise about one of them.
-    [[nodiscard]] double rise_along(const RestLine& line, const Place& p) const;
+    [[nodiscard]] double rise_along(const RestLine& line, const RestPlace& p) const;
 
     // A flat end mill that finishes leaves stairs on slopes along its lines, which may be narrower than a
     // cell: whether there is one over the limit between a place and one of another line, of which the higher
     // has cut, and the lower too, or stands at the slope's foot. Lines that go up or down the slope pass the
     // other's height where they come nearer to the stair, to the ridge between two circles.
-    [[nodiscard]] bool leaves_stair(const Place& a, const Place& b, double along) const;
+    [[nodiscard]] bool leaves_stair(const RestPlace& a, const RestPlace& b, double along) const;
 
     // Places that no cell has called for cut, too, where those of lines beside them leave a stair.
     void cut_stairs(std::vector<RestLine>& lines);
