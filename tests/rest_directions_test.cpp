@@ -8,12 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "engine/paths/operations/rest.h"
 #include "engine/paths/operations/rest_directions.h"
-#include "engine/paths/operations/roughing.h"
-#include "engine/stock/layer_stock.h"
-#include "tests/support/end_mill_job.h"
-#include "tests/support/height_field.h"
 #include "tests/support/seed.h"
 
 namespace slabwright {
@@ -132,53 +127,6 @@ TEST(RestDirections, LinesEndAtTheBorder) {
             EXPECT_NEAR(at[1], y * kUnitsPerMm, 2);
         }
     }
-}
-
-/// Moves by which a flat end mill clears the feet of a groove that is turned.
-std::size_t moves_along_groove(double degrees) {
-    const double c = std::cos(degrees * std::numbers::pi / 180),
-                 s = std::sin(degrees * std::numbers::pi / 180), top = 14;
-    Context context;
-    const Job job = test::end_mill_job();
-    const Mesh mesh = test::height_field(context, 160, 0.25, [&](double x, double y) {
-        const double across = std::abs(c * y - s * x);
-        return 4 + std::clamp(1.6 * (across - 4), 0.0, 8.0);
-    });
-    LayerJob layer;
-    Standing standing{{-25, -25}, {25, 25}, top};
-    LayerCut cut{context,
-                 layer,
-                 job,
-                 layer_solid(context, mesh.view(), 0, top),
-                 top,
-                 {},
-                 alpha_map(context, mesh.view(), 0, top),
-                 nullptr,
-                 {}};
-    layer.mesh = mesh.view();
-    layer.job = &job;
-    layer.z_bottom = 0;
-    layer.z_top = layer.slab_thickness = top;
-    layer.stock_min = {-25, -25};
-    layer.stock_max = {25, 25};
-    layer.tools.rough = tool_of_kind(job, ToolKind::flat);
-    layer.tools.finish = tool_of_kind(job, ToolKind::ball);
-    cut.standing = &standing;
-    LayerStock stock(context, cut.layer, cut.solid, 0.2);
-    stock.cut(context, rough_layer(cut).back(), layer.tools.rough);
-    Tool ball = layer.tools.finish, flat = ball;
-    flat.kind = ToolKind::flat;
-    (void)cut_rest(cut, stock, ball, {OperationKind::finish, "what is left", 0.07, false});
-    const Operation op = cut_rest(cut, stock, flat, {OperationKind::corner, "corners", 0.07, false});
-    return op.moves.size();
-}
-
-TEST(RestDirections, GroovesAreClearedAlongThem) {
-    const auto along_x = static_cast<double>(moves_along_groove(0));
-    EXPECT_GT(along_x, 100);
-    // Across it they are short: 3.1 and twice as many. (The other diagonal is across those of the mesh.)
-    for (const double degrees : {45.0, 90.0})
-        EXPECT_LT(static_cast<double>(moves_along_groove(degrees)), 1.7 * along_x) << degrees;
 }
 
 }  // namespace

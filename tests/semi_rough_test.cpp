@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <numbers>
 
 #include "engine/paths/operations/rest.h"
 #include "engine/paths/operations/roughing.h"
@@ -225,6 +226,29 @@ TEST(RestMachining, LeavesWhatItsCutterCannotTake) {
             EXPECT_LT(way_of(op), most[kinds]) << kinds;
             ++kinds;
         }
+}
+
+/// Moves by which a flat end mill clears the feet of a groove that is turned.
+double moves_along_groove(double degrees) {
+    const double c = std::cos(degrees * std::numbers::pi / 180),
+                 s = std::sin(degrees * std::numbers::pi / 180);
+    Waste w([&](double x, double y) { return 4 + std::clamp(1.6 * (std::abs(c * y - s * x) - 4), 0.0, 8.0); },
+            {});
+    Tool flat = w.layer.tools.finish;
+    flat.kind = ToolKind::flat;
+    LayerStock stock(w.cut.context, w.cut.layer, w.cut.solid, 0.2);
+    stock.cut(w.cut.context, rough_layer(w.cut).back(), w.layer.tools.rough);
+    (void)cut_rest(w.cut, stock, w.layer.tools.finish, {OperationKind::finish, "what is left", 0.07, false});
+    const Operation op = cut_rest(w.cut, stock, flat, {OperationKind::corner, "corners", 0.07, false});
+    return static_cast<double>(op.moves.size());
+}
+
+TEST(RestMachining, ClearsGroovesAlongThem) {
+    const double along_x = moves_along_groove(0);
+    EXPECT_GT(along_x, 100);
+    // The other diagonal is across those of the mesh.
+    for (const double degrees : {45.0, 90.0})
+        EXPECT_LT(moves_along_groove(degrees), 1.7 * along_x) << degrees;
 }
 
 TEST(RestMachining, FollowsChannelsAsFarAsTheyAreWideEnough) {

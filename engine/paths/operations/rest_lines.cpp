@@ -162,25 +162,16 @@ bool RestLines::leaves_stair(const Place& a, const Place& b, double along) const
 void RestLines::cut_stairs(std::vector<RestLine>& lines) {
     if (ball_ || pass_.in_steps) return;
     const std::vector<std::size_t> ranked = by_place(lines);
-    // The nearest that has cut, or the farthest that has not.
-    const auto beside = [&](std::size_t rank, int way, std::int32_t along) -> const Place* {
-        const std::int32_t from = lines[ranked[rank]].across;
-        const Place* farthest = nullptr;
-        for (std::size_t k = rank; way > 0 ? k + 1 < ranked.size() : k > 0;) {
-            const RestLine& line = lines[ranked[way > 0 ? ++k : --k]];
-            if (std::abs(line.across - from) > spacing_) break;
-            if (const Place* p = at(line, along)) farthest = p;
-            if (farthest && farthest->cut) break;
-        }
-        return farthest;
+    const auto beside = [&](std::size_t rank, bool after, std::int32_t along) {
+        return place_beside(lines, ranked, rank, after, along, [](const Place& p) { return p.cut; });
     };
     for (std::size_t rank = 0; rank < ranked.size(); ++rank) {
         RestLine& line = lines[ranked[rank]];
         std::vector<std::int32_t> stairs;
         for (const Place& p : line.places) {
             if (p.along % step_ != 0) continue;
-            const Place* before = beside(rank, -1, p.along);
-            const Place* after = before ? beside(rank, 1, p.along) : nullptr;
+            const Place* before = beside(rank, false, p.along);
+            const Place* after = before ? beside(rank, true, p.along) : nullptr;
             if (after && leaves_stair(*before, *after, rise_along(line, p)) &&
                 p.tip > std::min(before->tip, after->tip) && p.tip < std::max(before->tip, after->tip))
                 stairs.push_back(p.along);
@@ -214,6 +205,20 @@ std::vector<std::size_t> RestLines::by_place(const std::vector<RestLine>& lines)
     return ranked;
 }
 
+const RestPlace* RestLines::place_beside(const std::vector<RestLine>& lines,
+                                         const std::vector<std::size_t>& ranked, std::size_t rank, bool after,
+                                         std::int32_t along, bool (*is_wanted)(const Place&)) const {
+    const RestLine& from = lines[ranked[rank]];
+    const Place* last = nullptr;
+    for (std::size_t k = rank; after ? k + 1 < ranked.size() : k > 0;) {
+        const RestLine& line = lines[ranked[after ? ++k : --k]];
+        if (line.direction != from.direction || std::abs(line.across - from.across) > spacing_) break;
+        if (const Place* p = at(line, along)) last = p;
+        if (last && is_wanted(*last)) break;
+    }
+    return last;
+}
+
 RestLine RestLines::middle(const RestLine& a, const RestLine& b) const {
     RestLine line{a.direction, a.across + (b.across - a.across) / 2, {}};
     if (b.across - a.across < 2 * finest_) return line;
@@ -244,15 +249,8 @@ void RestLines::settle() {
     auto higher = [&](const Place* beside, const Place& p) {
         return beside && (beside->touches || !beside->reachable) && p.tip < beside->tip - kSettle;
     };
-    // Up to the next line of the even raster: lines between may not come by here.
-    auto beside = [&](std::size_t rank, bool after, std::int32_t along) -> const Place* {
-        const RestLine& from = lines_[ranked[rank]];
-        for (std::size_t k = rank; after ? k + 1 < ranked.size() : k > 0;) {
-            const RestLine& line = lines_[ranked[after ? ++k : --k]];
-            if (line.direction != from.direction || std::abs(line.across - from.across) > spacing_) break;
-            if (const Place* p = at(line, along)) return p;
-        }
-        return nullptr;
+    const auto beside = [&](std::size_t rank, bool after, std::int32_t along) {
+        return place_beside(lines_, ranked, rank, after, along, [](const Place&) { return true; });
     };
     std::vector<std::vector<RestLine>> found(lines_.size());
     parallel_each(cut_.context, lines_.size(), [&](std::size_t rank) {

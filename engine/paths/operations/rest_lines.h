@@ -76,6 +76,13 @@ private:
     // The lines in their order across, each direction's by themselves.
     static std::vector<std::size_t> by_place(const std::vector<RestLine>& lines);
 
+    // Across from a line of `ranked`, up to the next of the even raster, for lines between may not come by
+    // here: the first place there that is wanted, or the last that is not.
+    [[nodiscard]] const RestPlace* place_beside(const std::vector<RestLine>& lines,
+                                                const std::vector<std::size_t>& ranked, std::size_t rank,
+                                                bool after, std::int32_t along,
+                                                bool (*is_wanted)(const RestPlace&)) const;
+
     // A line between two, over what is too far from one to the other; without places where nothing is.
     [[nodiscard]] RestLine middle(const RestLine& a, const RestLine& b) const;
 
