@@ -9,6 +9,7 @@
 
 #include "engine/sheet_proof/sheet_proof.h"
 #include "engine/sheets/engraving.h"
+#include "engine/sheets/head_switches.h"
 #include "engine/sheets/sheet_plan.h"
 #include "io/posts/sheet_reader.h"
 #include "kernels/errors.h"
@@ -284,9 +285,32 @@ TEST(SheetEngraving, JobsThatCannotBeEngravedAreRefused) {
     refuses([](SheetJob& job) { job.engraving.depth = 0.1; }, SheetHead::jet, "15000");
     for (const char* text :
          {"M2", "M6", "G1", "M62 Q0", "M62 P", "M62 P0 P1", "M200", "m3", "", "M99", "M30"})
-        refuses([&](SheetJob& job) { job.on = text; }, SheetHead::jet, "is switched by two M words");
-    for (const char* text : {"M3", "M4", "M7", "M62 P3", "M65 P12", "M100", "M199 P2"})
-        EXPECT_TRUE(is_switch(text)) << text;
+        refuses([&](SheetJob& job) { job.on = text; }, SheetHead::jet,
+                "is switched on and off by two M words");
+    // A switch that is another one's, or the same one written otherwise.
+    for (const auto& [on, off] : {std::pair{"M3", "M3"},
+                                  {"M5", "M3"},
+                                  {"M3", "M9"},
+                                  {"M03", "M5"},
+                                  {"M62 P0", "M63 P1"},
+                                  {"M62 P0", "M062 P0"},
+                                  {"M62 P0", "M62 P00"},
+                                  {"M62", "M63"},
+                                  {"M3 P1", "M5"},
+                                  {"M7", "M109"},
+                                  {"M100", "M100"}})
+        refuses([&](SheetJob& job) { job.on = on, job.off = off; }, SheetHead::laser, "switched on and off");
+    for (const auto& [on, off] : {std::pair{"M3", "M5"},
+                                  {"M4", "M5"},
+                                  {"M7", "M9"},
+                                  {"M62 P3", "M63 P3"},
+                                  {"M64 P12", "M65 P12"},
+                                  {"M100", "M199 P2"},
+                                  {"M100 P1", "M100 P0"}})
+        EXPECT_TRUE(is_switch_pair(on, off)) << on << ' ' << off;
+    for (const char* text : {"M03", "M3", "M4", "M05", "M62 P0", "M64 P0", "M65 P0", "M063 P1"})
+        refuses([&](SheetJob& job) { job.on = "M62 P0", job.off = "M63 P0", job.begin = {text}; },
+                SheetHead::laser, "switches nothing beside the head");
 }
 
 }  // namespace

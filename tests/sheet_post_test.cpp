@@ -91,9 +91,10 @@ TEST(SheetPost, StandsInTheProgramsAndOptionsComeBeforeIt) {
                              "M62 P0\nG4 P1.25\n", "M9\nM2\n"})
         EXPECT_NE(text.find(part), std::string::npos) << part;
     EXPECT_EQ(run_command({command, "verify", folder / "out", "--stl", half_sphere}).exit, 0);
-    ASSERT_EQ(sheets({"--on", "M64 P3"}).exit, 0);
+    EXPECT_EQ(sheets({"--on", "M64 P3"}).exit, 2) << "M63 P0 would not switch it off";
+    ASSERT_EQ(sheets({"--on", "M64 P3", "--off", "M65 P3"}).exit, 0);
     text = support::slurp(folder / "out/nc/sheet_01.ngc");
-    EXPECT_NE(text.find("(head on M64 P3 off M63 P0)"), std::string::npos);
+    EXPECT_NE(text.find("(head on M64 P3 off M65 P3)"), std::string::npos);
     support::spit(folder / "shop.toml", "[laser]\nbegin = [\"M30\"]\n");
     const auto refused = sheets({});
     EXPECT_EQ(refused.exit, 2);

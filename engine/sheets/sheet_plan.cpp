@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <numeric>
 
+#include "engine/sheets/head_switches.h"
 #include "kernels/errors.h"
 #include "kernels/features/features.h"
 #include "kernels/polygons/border_distance.h"
@@ -52,17 +52,19 @@ void require_job(const SheetJob& job) {
                    "give its thickness to --thickness too");
     if (job.head == SheetHead::router && !(job.cutting.kerf > 0))
         refuse("a router's cutter has a diameter", "give --kerf");
-    if (!is_switch(job.on) || !is_switch(job.off) || job.on == job.off)
+    if (!is_switch_pair(job.on, job.off))
         refuse(
-            "a laser or a jet is switched by two M words (3 to 5, 7 to 9, 62 to 65, 100 to 199), each with a "
-            "P word or none",
+            "a laser or a jet is switched on and off by two M words: M3 or M4 and M5, M7 or M8 and M9, M62 "
+            "or M64 "
+            "and M63 or M65 with the same P, or two of M100 to M199",
             "give --on and --off like \"M62 P0\" and \"M63 P0\"");
     for (const auto* lines : {&job.begin, &job.end})
         for (const std::string& line : *lines)
-            if (!is_switch(line) || line == job.on || line == job.off || line == "M3" || line == "M4" ||
-                line == "M5")
-                refuse("\"" + line.substr(0, 40) + "\" switches nothing beside the head",
-                       "give M words (7 to 9, 62 to 65, 100 to 199), each with a P word or none");
+            if (!is_switch(line) || switches_head(line, job.on, job.off))
+                refuse(
+                    "\"" + line.substr(0, 40) + "\" switches nothing beside the head",
+                    "give M7 to M9, M62 to M65 with the P of another output, or M100 to M199, without zeros "
+                    "before a number");
     for (const SheetCount& count : job.counts)
         if (!is_stocked(job, count.thickness) || count.sheets < 0)
             refuse(fmt::format("{} sheets of {:.4g} mm are of no thickness in stock", count.sheets,
@@ -455,25 +457,6 @@ int lay_pieces(Context& context, SheetsPlan& plan, std::size_t t, const std::vec
 }
 
 }  // namespace
-
-bool is_switch(std::string_view text) {
-    const auto number = [&](std::size_t digits) {
-        int value = 0;
-        const char* const end = text.data() + std::min(text.size(), digits);
-        const auto [at, error] = std::from_chars(text.data(), end, value);
-        if (error != std::errc() || value < 0) return -1;
-        text.remove_prefix(static_cast<std::size_t>(at - text.data()));
-        return value;
-    };
-    if (text.empty() || text[0] != 'M') return false;
-    text.remove_prefix(1);
-    const int m = number(3);
-    const bool is_known = (m >= 3 && m <= 9 && m != 6) || (m >= 62 && m <= 65) || (m >= 100 && m <= 199);
-    if (!is_known || text.empty()) return is_known;
-    if (text.substr(0, 2) != " P") return false;
-    text.remove_prefix(2);
-    return number(3) >= 0 && text.empty();
-}
 
 double engraving_feed(const SheetJob& job) {
     if (job.head != SheetHead::jet) return job.engraving.feed;

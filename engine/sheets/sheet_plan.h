@@ -57,9 +57,9 @@ struct SheetJob {
     double through = 0.2;                                 ///< mm that a router cuts under the sheet
     int tool = 1;
     double power = 100;                   ///< laser: its S word while it cuts; stated where it engraves too
-    std::string on = "M3", off = "M5";    ///< what switches a laser or a jet: is_switch()
+    std::string on = "M3", off = "M5";    ///< what switches a laser or a jet: is_switch_pair()
     std::vector<std::string> begin, end;  ///< what switches gas, dust or abrasive before the first cut and
-                                          ///< after the last: is_switch(), none that switches a head
+                                          ///< after the last: is_switch(), none of switches_head()
     AbrasiveJet jet;
 };
 
@@ -92,10 +92,6 @@ struct SheetPiece {
 /// mm/min: given, or of a jet what enters as deep as is engraved. @throws Error(usage, "sheets.engrave")
 /// where a jet would have to run faster than 15 m/min
 [[nodiscard]] double engraving_feed(const SheetJob& job);
-
-/// Whether a text is an M word that may switch a laser or a jet, with a P word or without: M3, M4, M5, M7,
-/// M8, M9, M62 to M65, M100 to M199.
-[[nodiscard]] bool is_switch(std::string_view text);
 
 /// What is cut from one stock sheet.
 struct SheetProgram {

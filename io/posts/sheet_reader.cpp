@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "engine/sheets/head_switches.h"
 #include "engine/sheets/sheet_plan.h"
 #include "io/posts/dialect.h"
 #include "io/posts/gcode_line.h"
@@ -183,15 +184,19 @@ private:
             fail("gcode.switch", "a comment that does not say what switches the head");
         on_text_ = text.substr(8, off - 8);
         off_text_ = text.substr(off + 5);
-        if (!is_switch(on_text_) || !is_switch(off_text_) || on_text_ == off_text_)
-            fail("gcode.switch", "words that do not switch a head");
+        if (!is_switch_pair(on_text_, off_text_)) fail("gcode.switch", "words that do not switch a head");
+        for (const std::string& line : beside_) check_beside(line);
     }
 
     /// A line that switches something else: gas, dust, abrasive.
     void beside(std::string line) {
-        if (!is_switch(line) || is_set_ || line == "M3" || line == "M4" || line == "M5")
-            fail("gcode.switch", "words beside the head that do not switch something else");
+        if (is_set_) fail("gcode.switch", "words beside the head after its settings");
+        check_beside(line);
         beside_.push_back(std::move(line));
+    }
+    void check_beside(const std::string& line) const {
+        if (!is_switch(line) || switches_head(line, on_text_, off_text_))
+            fail("gcode.switch", "words beside the head that do not switch something else");
     }
 
     ReadPiece& piece_of(int number) {
