@@ -1,4 +1,5 @@
 // One solid in every format is one mesh, and what is damaged ends in a clear error or a mesh.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -206,7 +207,7 @@ std::string archive(const std::vector<std::pair<std::string, std::string>>& file
 }
 
 std::string three_mf(const Indexed& solid, const std::string& unit = "millimeter",
-                     const std::string& build = R"(<item objectid="1"/>)") {
+                     const std::string& build = R"(<item objectid="1"/>)", const std::string& objects = "") {
     std::string model = R"(<?xml version="1.0" encoding="UTF-8"?><model unit=")" + unit +
                         R"(" xml:lang="en-US" )"
                         R"(xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>)"
@@ -218,7 +219,7 @@ std::string three_mf(const Indexed& solid, const std::string& unit = "millimeter
     for (const Index3& f : solid.facets)
         model += "<triangle v1=\"" + std::to_string(f[0]) + "\" v2=\"" + std::to_string(f[1]) + "\" v3=\"" +
                  std::to_string(f[2]) + "\"/>";
-    model += "</triangles></mesh></object></resources><build>" + build + "</build></model>";
+    model += "</triangles></mesh></object>" + objects + "</resources><build>" + build + "</build></model>";
     return archive(
         {{"[Content_Types].xml",
           R"(<?xml version="1.0"?><Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">)"
@@ -428,17 +429,47 @@ TEST(MeshFormats, BadInputIsOneLineWithItsPlace) {
          "ply.truncated x.ply, offset 124"},
     };
     for (const auto& [name, bytes, expected] : cases) EXPECT_EQ(refusal(context, {name, bytes}), expected);
+    std::string many = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf";
+    for (int corner = 0; corner < 4098; ++corner) many += fmt::format(" {}", corner % 3 + 1);
+    EXPECT_EQ(refusal(context, {"x.obj", many + "\n"}), "obj.polygon x.obj, line 4");
     if (is_built("3MF")) {
         EXPECT_EQ(refusal(context, {"x.3mf", "no archive"}), "3mf.not_3mf x.3mf, offset 0");
         EXPECT_EQ(refusal(context, {"x.3mf", three_mf(block_with_boss()).substr(0, 2000)}),
                   "3mf.damaged x.3mf, offset 2000");
         EXPECT_EQ(refusal(context, {"x.3mf", three_mf(block_with_boss(), "millimeter", "")}).substr(0, 4),
                   "3mf.");
+        const std::string far = R"(<item objectid="1" transform="1 0 0 0 1 0 0 0 1 1e9 0 0"/>)";
+        EXPECT_EQ(refusal(context, {"x.3mf", three_mf(block_with_boss(), "millimeter", far)}),
+                  "3mf.absurd x.3mf, vertex 0 of a mesh (counted from 0)");
+        std::string nested;  // each holds the one before it
+        for (int id = 2; id < 40; ++id)
+            nested += fmt::format(
+                R"(<object id="{}" type="model"><components><component objectid="{}"/></components></object>)",
+                id, id - 1);
+        EXPECT_EQ(refusal(context, {"x.3mf", three_mf(block_with_boss(), "millimeter",
+                                                      R"(<item objectid="39"/>)", nested)}),
+                  "3mf.nested x.3mf");
     }
     if (is_built("STEP")) {
         EXPECT_EQ(refusal(context, {"x.step", "no step"}), "step.not_step x.step, line 1");
         EXPECT_EQ(refusal(context, {"x.step", "ISO-10303-21;\nHEADER;\n"}).substr(0, 5), "step.");
+        const std::string drawing =
+            "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
+            "FILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\n"
+            "ENDSEC;\nEND-ISO-10303-21;\n";
+        EXPECT_EQ(refusal(context, {"x.step", drawing}), "step.no_facets x.step");
     }
+}
+
+// The process that reads STEP is forked with what its parent has not yet written.
+TEST(MeshFormats, ReadingStepWritesNothingTwice) {
+    if (!is_built("STEP")) GTEST_SKIP() << "STEP was not built";
+    Context context;
+    testing::internal::CaptureStdout();
+    std::fputs("once", stdout);
+    const std::string said = refusal(context, {"x.step", "ISO-10303-21;\nHEADER;\n"});
+    EXPECT_EQ(testing::internal::GetCapturedStdout(), "once");
+    EXPECT_EQ(said, "step.unreadable x.step");
 }
 
 /// A file with something done to it, as transfers and editors do.

@@ -106,6 +106,11 @@ TEST(Refusals, TablesOfJoints) {
     EXPECT_EQ(refused({.response = "N"}), "bond.column");
     EXPECT_EQ(refused({.ignored = {"day"}}), "bond.column");
     EXPECT_EQ(refused({.ignored = {"MPa"}}), "bond.column");
+    std::string long_one = "glue,MPa\n";
+    for (std::size_t row = 0; row <= kMostBondRows; ++row)
+        long_one += row % 2 == 0 ? "thin,1\n" : "thick,2\n";
+    spit(path, long_one);
+    EXPECT_EQ(refused({}), "bond.rows");
     spit(path, std::string("glue,MPa\nth\0n,1\n", 16));
     EXPECT_EQ(refused({}), "bond.text");
 }
@@ -147,10 +152,32 @@ TEST(Refusals, TheFrontDoor) {
     for (const double bad : {0.0, -1.0, kNaN, HUGE_VAL, 10.0, 1e-6})
         EXPECT_EQ(sliced(bad, "s.svg"), "slice.every") << bad;
 
+    EXPECT_EQ(refusal([&] { (void)post_file_toml("fanoc"); }), "post.base");
+
     Job inches;
     inches.units = LengthUnit::inch;
     const std::shared_ptr<Pattern> read = read_pattern(context, PatternSource{stl}, Job{});
     EXPECT_EQ(refusal([&] { (void)plan(context, *read, inches); }), "plan.reading");
+}
+
+TEST(Refusals, MeshesInMemory) {
+    Context context;
+    std::vector<PatternSource::Vertex> vertices{{0, 0, 0}, {20, 0, 0}, {0, 20, 0}, {0, 0, 20}};
+    std::vector<PatternSource::Facet> facets{{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+    const auto refused = [&] {
+        return refusal(
+            [&] { (void)read_pattern(context, PatternSource::of_mesh(vertices, facets, "m"), Job{}); });
+    };
+    EXPECT_EQ(refused(), "");
+    for (const double bad : {kNaN, HUGE_VAL, 1e9}) {
+        vertices[1][0] = bad;
+        EXPECT_EQ(refused(), bad == 1e9 ? "mesh.absurd" : "mesh.non_finite") << bad;
+    }
+    vertices[1][0] = 20;
+    facets[3][2] = 4;
+    EXPECT_EQ(refused(), "mesh.index");
+    facets.clear();
+    EXPECT_EQ(refused(), "mesh.no_facets");
 }
 
 TEST(Refusals, OtherPatternsAndOpenOnes) {

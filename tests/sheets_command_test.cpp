@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "tests/support/command.h"
 #include "tests/support/files.h"
@@ -69,6 +71,39 @@ TEST(SheetsCommand, VerifyFindsAChangedProgramAndForeignFilesStay) {
     const CommandResult refused = sheets(out);
     EXPECT_EQ(refused.exit, 3);
     EXPECT_EQ(support::slurp(out + "/notes.txt"), "mine");
+}
+
+TEST(SheetsCommand, VerifyRefusesAFolderThatIsNoneOfOurs) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "out";
+    ASSERT_EQ(sheets(out, {"--thickness", "12"}).exit, 0);
+    const auto verified = [&] { return run_command({command, "verify", out, "--stl", half_sphere}); };
+    const std::string good = support::slurp(out + "/sheets.json");
+    const auto change = [&](const std::function<void(nlohmann::json&)>& edit) {
+        nlohmann::json document = nlohmann::json::parse(good);
+        edit(document);
+        support::spit(out + "/sheets.json", document.dump());
+    };
+    const std::vector<std::function<void(nlohmann::json&)>> edits{
+        [](nlohmann::json& j) { j["schema"] = "slabwright.sheets/2"; },
+        [](nlohmann::json& j) { j["input"]["units"] = "furlong"; },
+        [](nlohmann::json& j) { j["axis"] = ""; },
+        [](nlohmann::json& j) { j["programs"] = 5; },
+        [](nlohmann::json& j) { j.erase("input"); },
+    };
+    for (const auto& edit : edits) {
+        change(edit);
+        const CommandResult result = verified();
+        EXPECT_EQ(result.exit, 5) << result.out << result.err;
+        EXPECT_NE(result.err.find("is no sheets.json of ours"), std::string::npos) << result.err;
+    }
+    support::spit(out + "/sheets.json", good);
+    support::spit(out + "/nc/sheet_99.ngc", "M2\n");
+    const CommandResult stray = verified();
+    EXPECT_EQ(stray.exit, 5) << stray.out << stray.err;
+    EXPECT_NE(stray.err.find("is a program that sheets.json does not name"), std::string::npos) << stray.err;
+    std::filesystem::remove(out + "/nc/sheet_99.ngc");
+    EXPECT_EQ(verified().exit, 0);
 }
 
 TEST(SheetsCommand, RefusesInOneLine) {

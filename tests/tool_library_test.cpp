@@ -123,6 +123,15 @@ TEST(ToolLibrary, FreecadStatesShapesAndTheJobTheRest) {
                   (void)job_with("numbers = [4]\n" + rest + "[[tool]]\nnumber = 4\ndiameter = 6.0\n");
               }).substr(0, 26),
               "tools.conflict job.toml:9:");
+    for (const auto& [text, said] :
+         {std::pair{"[1]", "no object"},
+          {"{\"tools\": 3}", "no list of tools"},
+          {"{\"tools\": [{\"nr\": \"4\", \"path\": \"mill.fctb\"}]}", "a tool without nr and path"}}) {
+        spit(folder / "Library/odd.fctl", text);
+        spit(folder / "job.toml", "[tools]\nlibrary = \"Library/odd.fctl\"\n" + rest);
+        const std::string error = error_of([&] { (void)read_job(folder / "job.toml"); });
+        EXPECT_TRUE(error.starts_with("tools.syntax odd.fctl:1") && error.ends_with(said)) << error;
+    }
     drill.replace(drill.find("118.00"), 6, "135.00");
     spit(folder / "Library/drill.fctb", drill);
     EXPECT_EQ(job_with("numbers = [7]\n" + rest).tools[0].point_deg, 135);

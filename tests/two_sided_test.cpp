@@ -223,9 +223,15 @@ TEST_F(TwoSided, ADowelMirroredTheWrongWayIsFound) {
 
 TEST_F(TwoSided, AnUndersideOfAnotherSlabIsFound) {
     const std::string file = built_->undersides.at(0) + "/plan.json";
-    json under = json::parse(slurp(file));
+    const std::string whole = slurp(file);
+    json under = json::parse(whole);
     under["turned"]["z_bottom"] = under["turned"]["z_bottom"].get<double>() + 0.5;
     EXPECT_TRUE(found(file, under.dump()).contains("underside.slab"));
+    under = json::parse(whole), under["turned"]["web"] = 1000;
+    EXPECT_TRUE(found(file, under.dump()).contains("underside.slab"));
+    under.erase("turned");
+    EXPECT_THROW((void)found(file, under.dump()), Error);
+    spit(file, whole);
 }
 
 TEST_F(TwoSided, WhatDoesNotGoWithItIsRefused) {
@@ -276,14 +282,20 @@ TEST_F(TwoSided, ABuildKilledAfterAnyStepGoesOnFromDisk) {
     const std::string file = built_->out + "/progress.json";
     json progress = json::parse(slurp(file));
     ASSERT_EQ(progress["state"]["undersides"].size(), 1U) << progress["state"].dump();
-    for (json& of : progress["state"]["undersides"]) of = json::array({1, 0});
-    spit(file, progress.dump());
-    try {
-        (void)resume_build(context, built_->out, {});
-        ADD_FAILURE() << "a slab that is not turned is taken for turned";
-    } catch (const Error& error) {
-        EXPECT_EQ(error.code(), "resume.state");
-    }
+    const auto refused = [&](const json& undersides) {
+        progress["state"]["undersides"] = undersides;
+        spit(file, progress.dump());
+        try {
+            (void)resume_build(context, built_->out, {});
+        } catch (const Error& error) {
+            return error.code();
+        }
+        return std::string();
+    };
+    json not_turned = progress["state"]["undersides"];
+    for (json& of : not_turned) of = json::array({1, 0});
+    EXPECT_EQ(refused(not_turned), "resume.state");
+    EXPECT_EQ(refused(json::object()), "resume.progress");
     std::filesystem::remove(file);
 }
 

@@ -406,6 +406,33 @@ TEST(Verify, EachCorruptionIsReportedAsWhatItIs) {
     }
 }
 
+TEST(Verify, CellsThatAreNoneAndFilesThatAreAway) {
+    Folder f("away");
+    Context context;
+    const std::string stl = support::checkout("tests/data/half-sphere.stl"), out = (f.path / "out").string();
+    Job job;
+    job.machine.magazine = 8;
+    write(context, plan(context, stl, job), out);
+    const auto verified = [&](double cell) {
+        std::string codes;
+        try {
+            for (const Diagnostic& d : verify(context, out, stl, "", cell).violations)
+                codes += (codes.empty() ? "" : " ") + d.code;
+        } catch (const Error& e) {
+            codes = "error " + e.code();
+        }
+        return codes;
+    };
+    EXPECT_EQ(verified(1), "");
+    for (const double cell : {-1.0, 0.001, 50.0}) EXPECT_EQ(verified(cell), "error verify.cell") << cell;
+    fs::rename(out + "/cut_list.csv", out + "/sequence.csv");
+    EXPECT_TRUE(has(verified(1), "cut_list.no_file")) << verified(1);
+    fs::rename(out + "/sequence.csv", out + "/cut_list.csv");
+    fs::rename(out + "/sequence.json", f.path / "sequence.json");
+    fs::create_directory(out + "/sequence.json");
+    EXPECT_TRUE(verified(1).starts_with("error verify.sequence_file")) << verified(1);
+}
+
 // The planner's own programs: they pass, and the same corruptions of them do not.
 TEST(Verify, PlannedHalfSphere) {
     Folder f("sphere");

@@ -258,11 +258,20 @@ std::uint64_t data_bytes_now() {
     return 0;
 }
 
+/// OCCT ends lines on the standard output, which in a forked process also writes what its parent has waiting
+/// there. @param file what this process answers into; it moves away where the output was closed
+void keep_off_output(int& file) {
+    if (file == STDOUT_FILENO) file = ::fcntl(file, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
+    const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (nowhere >= 0 && nowhere != STDOUT_FILENO) (void)::dup2(nowhere, STDOUT_FILENO);
+}
+
 /// The reading process: never returns.
 [[noreturn]] void read_and_tell(int file, Context& context, std::string_view bytes, double deviation_mm,
                                 const std::string& place, std::uint64_t memory_bytes) {
     for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGILL, SIGPIPE, SIGINT, SIGTERM, SIGHUP})
         ::signal(signal, SIG_DFL);
+    keep_off_output(file);
     const std::uint64_t most = data_bytes_now() + memory_bytes;
     const rlimit no_core{0, 0}, data{most, most};
     (void)::setrlimit(RLIMIT_CORE, &no_core);
