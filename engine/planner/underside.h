@@ -16,7 +16,8 @@ namespace slabwright {
 
 /// Refuses what a job with layers.sides other than `one` cannot ask for yet.
 /// @param pattern with neighbours
-/// @throws Error(no_plan, "underside.open") for a pattern that is open at its base
+/// @throws Error(no_plan, "layers.sides"), Error(no_plan, "underside.open") for a pattern that is open at its
+/// base
 void check_two_sided(const Job& job, MeshView pattern);
 
 /// Layers for slabs that are milled on both sides. With `automatic`, those of `from_above` where that leaves

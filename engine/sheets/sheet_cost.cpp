@@ -29,7 +29,8 @@ const Item* named(std::span<const Item> items, std::string_view name) {
 SheetCost other_way(Context& context, const Mesh& mesh, const SheetJob& job, std::string way, double density,
                     const SheetPrices& prices) {
     try {
-        return cost_of(plan_sheets(context, mesh, job), std::move(way), density, prices);
+        const SheetsPlan plan = plan_sheets(context, mesh, job);
+        return cost_of(plan, std::move(way), density, prices);
     } catch (const Error& error) {
         if (error.kind() != ErrorKind::no_plan) throw;
         SheetCost cost;

@@ -154,7 +154,7 @@ FacetScene::EmbreeScene FacetScene::build(std::span<const Index3> facets) {
         built.reset();
         memory_.charge();
         throw Error(ErrorKind::no_plan, "embree.build", "Embree could not build its tree", {},
-                    "free memory_, or plan with fewer facets");
+                    "free memory, or plan with fewer facets");
     }
     return built;
 }

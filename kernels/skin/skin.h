@@ -55,8 +55,8 @@ struct Skinned {
 /// @param skin mm over 0. On some facets only, those beside stay where they are, and the skin is by vertices
 /// or not at all
 /// @throws Error(input, "skin.none") where no facet is chosen, "skin.impossible" where the chosen facets
-/// cannot move alone, "skin.thin" where the measurement finds less than asked, Error(no_plan,
-/// "memory.limit"), Error(cancelled)
+/// cannot move alone, "skin.open" where it would have to be made anew on a grid and the base is open,
+/// "skin.thin" where the measurement finds less than asked, Error(no_plan, "memory.limit"), Error(cancelled)
 [[nodiscard]] Skinned add_skin(Context& context, MeshView mesh, const Skin& skin);
 
 }  // namespace slabwright
