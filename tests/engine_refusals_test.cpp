@@ -423,6 +423,8 @@ TEST(EngineRefusals, CuttersThatAreNone) {
     EXPECT_EQ(refusal([&] { (void)accessible(context, box.view(), 0, 5, tool, options); }), "access.options");
     for (const double radius : {0.0, -1.0, kNaN, HUGE_VAL})
         EXPECT_EQ(refusal([&] { (void)printed_accessibility(Loops{}, radius); }), "access.printed") << radius;
+    const std::vector<std::uint8_t> one(1, 1);
+    EXPECT_EQ(refusal([&] { (void)printed_accessibility(Loops{}, 1, 2, one); }), "access.printed");
 
     const LayerSolid solid = layer_solid(context, box.view(), 0, 8);
     const auto dropped = [&](double radius) {
