@@ -102,7 +102,8 @@ std::string in_words(const std::map<std::string, Found>& found) {
 
 std::string_view remedy(std::string_view code) {
     if (code.starts_with("left."))
-        return "give a tool that gets there, smaller or longer, or another strategy of layers";
+        return "give a tool that gets there, smaller, longer or one that plunges, or another strategy of "
+               "layers";
     if (code.starts_with("gouge.")) return "mend the mesh there, or give other tools";
     if (code.starts_with("contact.")) return "give a tool with a longer stick-out or longer flutes";
     if (code.starts_with("plunge.")) return "give a tool that plunges, or one with a smaller core_diameter";

@@ -298,6 +298,77 @@ TEST(Plunge, ARampAsLongAsTheCoreIsWide) {
     }
 }
 
+// Where the cutter's middle may be: a rectangle of `length` × `width` (mm) around a place, turned.
+std::shared_ptr<const Loops> narrow_room(double x, double y, double turn, double length, double width) {
+    Loops room;
+    for (const auto& [u, v] : {std::pair{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}}) {
+        const double along = u * length, across = v * width;
+        room.points.push_back({to_units(x + along * std::cos(turn) - across * std::sin(turn)),
+                               to_units(y + along * std::sin(turn) + across * std::cos(turn))});
+    }
+    room.close_loop();
+    return std::make_shared<const Loops>(std::move(room));
+}
+
+// A run that begins in a corner of a narrow room and rises at once has neither a helix nor a ramp of its own:
+// it is entered where beside it there is room for one.
+TEST(Plunge, ANarrowRoomIsEnteredBesideItsRuns) {
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (int round = 0; round < 60; ++round) {
+        const Tool& tool = cored_tools()[1];
+        Bench bench(tool);
+        const double r = tool.diameter / 2, x = 50 + 60 * unit(random), y = 200 * unit(random) - 100,
+                     turn = 2 * std::numbers::pi * unit(random), length = (1 + 3 * unit(random)) * r,
+                     width = (0.3 + 1.5 * unit(random)) * r, z = 2 + 10 * unit(random);
+        SCOPED_TRACE(testing::Message() << "round " << round << ": " << length << " x " << width << " mm");
+        Surroundings around = bench.cut.around(tool, &bench.part);
+        around.room = narrow_room(x, y, turn, length, width);
+        PathBuilder path(bench.operation, tool, 3000, kTop + 10, kTop + 2);
+        path.set_surroundings(around);
+        const double along = 0.5 * length - 0.1, across = 0.5 * width - 0.1;
+        const PathPoint corner{to_units(x + along * std::cos(turn) - across * std::sin(turn)),
+                               to_units(y + along * std::sin(turn) + across * std::cos(turn)), to_units(z)};
+        path.follow(std::vector<PathPoint>{corner, {corner.x, corner.y, to_units(z + 1)}});
+        EXPECT_EQ(path.left_out(), 0U);
+        path.finish();
+        const std::vector<Move>& moves = bench.operation.moves;
+        EXPECT_TRUE(std::any_of(moves.begin(), moves.end(), [&](const Move& m) {
+            return m.x == corner.x && m.y == corner.y && m.z == corner.z && m.feed > 0;
+        }));
+        for (const Move& m : moves)
+            EXPECT_TRUE(m.z > to_units(kTop) || path.has_room({m.x, m.y}))
+                << "x " << to_mm(m.x) << " y " << to_mm(m.y) << " z " << to_mm(m.z);
+        EXPECT_EQ(contact_of(moves, tool, bench.stock).cells, 0U);
+    }
+}
+
+// A short run in a crack as wide as the cutter, too short for its core, is left out until another comes that
+// way from farther off.
+TEST(Plunge, WhatWasLeftOutIsFollowedOnceThereIsRoom) {
+    const Tool& tool = cored_tools()[3];
+    const auto at = [](double along) { return PathPoint{to_units(80 + along), to_units(10), to_units(8)}; };
+    const std::vector<std::vector<PathPoint>> runs{{at(0), at(0.3)}, {at(2), at(60)}};
+    for (const bool both : {false, true}) {
+        Bench bench(tool);
+        Surroundings around = bench.cut.around(tool, &bench.part);
+        around.room = narrow_room(80 + 3, 10, 0, core_diameter_of(tool) - 1, 0.05);
+        PathBuilder path(bench.operation, tool, 3000, kTop + 10, kTop + 2);
+        path.set_surroundings(around);
+        for (const std::vector<PathPoint>& run : std::span(runs).first(both ? 2 : 1)) path.follow(run);
+        EXPECT_EQ(path.left_out(), 1U);
+        path.follow_left_out(0);
+        EXPECT_EQ(path.left_out(), both ? 0U : 1U);
+        path.finish();
+        EXPECT_EQ(bench.cut.no_way_in.size(), both ? 0U : 1U);
+        EXPECT_EQ(contact_of(bench.operation.moves, tool, bench.stock).cells, 0U);
+        const std::vector<Move>& moves = bench.operation.moves;
+        EXPECT_EQ(both, std::any_of(moves.begin(), moves.end(), [&](const Move& m) {
+                      return PathPoint{m.x, m.y, m.z} == runs[0].front() && m.feed > 0;
+                  }));
+    }
+}
+
 void expect_no_core_contact(const Plan& plan) {
     Stock stock(grid_over(plan.stock_min, plan.stock_max, 0.5));
     for (const Layer& layer : plan.layers) {

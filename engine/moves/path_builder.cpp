@@ -13,13 +13,7 @@ namespace {
 
 constexpr double kPointMiddle = 0.1;  // mm: the same of a point
 constexpr double kBallMiddle = 0.75;  // of a ball's radius: what counts as head-on
-constexpr std::array kHelixRadii{
-    0.9, 0.65, 0.45};  // of the cutter's radius: under it, so that no post is left in the middle
-constexpr int kSideRings = 6,
-              kSideWays = 16;          // places looked at beside a run that no helix and no ramp reaches
-constexpr double kSideStep = 0.4;      // of the cutter's radius, between their rings
-constexpr double kRecessShare = 0.9;   // of a core's recess that helices and ramps fill
-constexpr double kClearOfPost = 1.02;  // of the core's radius: the least radius of a helix
+constexpr double kRecessShare = 0.9;  // of a core's recess that helices and ramps fill
 
 double distance_mm(const PathPoint& a, const PathPoint& b) {
     return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y) / kUnitsPerMm;
@@ -241,157 +235,6 @@ void PathBuilder::descend(const PathPoint& to) {
     if (std::max(met, to.z) < z_) sink(std::max(met, to.z));
 }
 
-// From above the start of a run down to it. A slice along a wall is no plunge: only what stands under the
-// middle of the cutter asks for a helix or a ramp; of a short way down, what no edge has passed over on the
-// ways before it. Says whether there was a way in.
-bool PathBuilder::enter(std::span<const PathPoint> run) {
-    const PathPoint& first = run.front();
-    descend(first);
-    const double most = plunges_ ? kPlunge : kScrape;
-    const bool far = to_mm(z_ - first.z) > most;
-    if (far ? standing_middle({first.x, first.y}) > to_mm(first.z) + most : comes_down_on_stock(first)) {
-        if (!enter_on_helix(run) && !enter_on_ramp(run) && !plunges_ && !enter_from_side(first)) return false;
-    }
-    plunge(first.z);
-    return true;
-}
-
-// Around a circle on the left of the run, where it is free, that ends in the run's direction. The part lies
-// on the right of a run that climbs, so the circle's room is looked for on the other side. Whole turns, none
-// steeper than the ramp.
-bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
-    if (around_.part == nullptr || around_.cutter.is_ball() || around_.cutter.taper_rad > 0) return false;
-    const PathPoint& first = run.front();
-    double ux = 0, uy = 0;
-    for (std::size_t k = 1; k < run.size() && ux == 0 && uy == 0; ++k) {
-        if (run[k].z != first.z) return false;
-        ux = static_cast<double>(run[k].x) - first.x;
-        uy = static_cast<double>(run[k].y) - first.y;
-    }
-    const double length = std::hypot(ux, uy);
-    if (length == 0) return false;
-    ux /= length;
-    uy /= length;
-    for (const double share : kHelixRadii) {
-        const double radius = share * around_.cutter.radius, cx = to_mm(first.x) - radius * uy,
-                     cy = to_mm(first.y) + radius * ux;
-        if (radius < kClearOfPost * core_) return false;
-        // Round a circle wider than the core, no point is under it for longer.
-        const double slope = slope_under_core(2 * radius * std::asin(core_ / radius));
-        // Chords that the machine takes as fast as the circle: no farther from it than it may pass by a
-        // corner.
-        const double chord = std::min(around_.chord, std::sqrt(8 * radius * operation_.blend));
-        const int chords = static_cast<int>(std::ceil(2 * std::numbers::pi * radius / chord));
-        std::vector<std::array<double, 2>> circle;
-        bool free = true;
-        for (int k = 0; k <= chords && free; ++k) {
-            // The first place lies at the angle of the run's right side, seen from the centre.
-            const double turn = 2 * std::numbers::pi * (k % chords) / chords, c = std::cos(turn),
-                         s = std::sin(turn);
-            circle.push_back({cx + radius * (uy * c + ux * s), cy + radius * (-ux * c + uy * s)});
-            free = k == 0 || k == chords ||
-                   (!around_.part->stands_over(circle.back()[0], circle.back()[1], to_mm(first.z)) &&
-                    has_room({to_units(circle.back()[0]), to_units(circle.back()[1])}));
-        }
-        if (!free) continue;
-        double top = standing_middle({first.x, first.y});
-        for (int k = 0; k < chords; ++k)
-            top =
-                std::max(top, around_.standing->free_tip(around_.cutter, circle[static_cast<std::size_t>(k)],
-                                                         circle[static_cast<std::size_t>(k) + 1]));
-        const double drop = (top + 0.1 - to_mm(first.z)) * kUnitsPerMm;
-        const double turns = std::ceil(drop / (2 * std::numbers::pi * radius * kUnitsPerMm * slope));
-        if (turns > 100) return false;
-        sink(first.z + static_cast<std::int32_t>(drop));
-        const int places = static_cast<int>(turns) * chords, level = core_ > 0 ? chords : 0;
-        for (int k = 1; k <= places + level; ++k) {
-            const std::array<double, 2>& p = circle[static_cast<std::size_t>(k % chords)];
-            const Point2 at =
-                k % chords == 0 ? Point2{first.x, first.y} : Point2{to_units(p[0]), to_units(p[1])};
-            const double left = std::max(0.0, 1 - static_cast<double>(k) / places);
-            cut(at, first.z + static_cast<std::int32_t>(std::ceil(drop * left)));
-        }
-        return true;
-    }
-    return false;
-}
-
-// To and fro over the run's beginning, every point of it raised by what is still to go down.
-bool PathBuilder::enter_on_ramp(std::span<const PathPoint> run) {
-    const PathPoint& first = run.front();
-    const double longest = 4 * around_.cutter.radius * kUnitsPerMm;
-    double length = 0, height = standing_middle({first.x, first.y}) - to_mm(first.z);
-    std::vector<PathPoint> stretch{first};
-    for (std::size_t k = 1; k < run.size() && length < longest; ++k) {
-        const PathPoint& p = run[k - 1];
-        PathPoint q = run[k];
-        if (core_ > 0 && q.z != first.z) break;
-        const double way = std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y);
-        if (length + way > longest) {
-            const double t = (longest - length) / way;
-            q = {p.x + static_cast<std::int32_t>(t * (static_cast<double>(q.x) - p.x)),
-                 p.y + static_cast<std::int32_t>(t * (static_cast<double>(q.y) - p.y)), std::max(p.z, q.z)};
-        }
-        length += std::min(way, longest - length);
-        height = std::max(
-            height, around_.standing->free_tip(middle(), {to_mm(p.x), to_mm(p.y)}, {to_mm(q.x), to_mm(q.y)}) -
-                        to_mm(std::min(p.z, q.z)));
-        stretch.push_back(q);
-    }
-    const double drop = (height + 0.1) * kUnitsPerMm, slope = slope_to_and_fro(stretch);
-    const double legs = length > kUnitsPerMm && slope > 0 ? 2 * std::ceil(drop / (2 * length * slope)) : 0;
-    if (legs <= 0 || legs >= 1000) return false;
-    sink(first.z + static_cast<std::int32_t>(drop));
-    double done = 0;
-    const int level = core_ > 0 ? 2 : 0;
-    for (int leg = 0; leg < static_cast<int>(legs) + level; ++leg) {
-        if (leg > 0) std::reverse(stretch.begin(), stretch.end());
-        for (std::size_t k = 1; k < stretch.size(); ++k) {
-            const PathPoint &p = stretch[k - 1], &q = stretch[k];
-            done += std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y);
-            cut({q.x, q.y}, q.z + static_cast<std::int32_t>(
-                                      std::ceil(std::max(0.0, drop * (1 - done / (length * legs))))));
-        }
-    }
-    return true;
-}
-
-// The nearest place beside a run's beginning where the cutter is free and its middle meets nothing, and from
-// which it may go straight across; of places as near the one nearest to where the tool is.
-std::optional<Point2> PathBuilder::place_beside(const PathPoint& first) {
-    if (around_.part == nullptr) return std::nullopt;
-    std::optional<Point2> best;
-    double least = kUnbounded;
-    for (int ring = 1; ring <= kSideRings && !best; ++ring)
-        for (int k = 0; k < kSideWays; ++k) {
-            const double turn = 2 * std::numbers::pi * k / kSideWays,
-                         far = ring * kSideStep * around_.cutter.radius * kUnitsPerMm;
-            const Point2 beside{first.x + static_cast<std::int32_t>(std::lround(far * std::cos(turn))),
-                                first.y + static_cast<std::int32_t>(std::lround(far * std::sin(turn)))};
-            const double way =
-                std::hypot(static_cast<double>(beside.x) - x_, static_cast<double>(beside.y) - y_);
-            if (way >= least || !has_room(beside) ||
-                around_.part->stands_over(to_mm(beside.x), to_mm(beside.y), to_mm(first.z) - around_.under) ||
-                standing_middle(beside) > to_mm(first.z) + kScrape ||
-                !part_leaves_way(beside, {first.x, first.y}, first.z))
-                continue;
-            least = way;
-            best = beside;
-        }
-    return best;
-}
-
-// Down there, and from there straight across: into the corner of a pocket that was cleared before.
-bool PathBuilder::enter_from_side(const PathPoint& first) {
-    const std::optional<Point2> beside = place_beside(first);
-    if (!beside) return false;
-    if (!go_straight(*beside, first.z)) go_above(*beside);
-    descend({beside->x, beside->y, first.z});
-    plunge(first.z);
-    cut({first.x, first.y}, first.z);
-    return true;
-}
-
 // Where the tool is down, at its height or that of a cut, whichever is higher, to over that, if the way is
 // free.
 bool PathBuilder::go_straight(Point2 to, std::int32_t z) {
@@ -440,13 +283,25 @@ void PathBuilder::follow(std::span<const PathPoint> run) {
         double top = 0;
         const std::span<const PathPoint> stretch = run.first(stretch_at_once(run, top));
         run = stretch.size() < run.size() ? run.subspan(stretch.size() - 1) : run.last(0);
-        if (top > -1e299 && !cut_down_to(stretch, top)) {
-            if (around_.no_way_in != nullptr)
-                around_.no_way_in->push_back(
-                    {to_mm(stretch.front().x), to_mm(stretch.front().y), to_mm(stretch.front().z)});
-            continue;
-        }
-        follow_at_once(stretch);
+        if (top > -1e299 && !cut_down_to(stretch, top)) leave_out(stretch);
+        else follow_at_once(stretch);
+    }
+}
+
+void PathBuilder::leave_out(std::span<const PathPoint> run) {
+    left_out_.emplace_back(run.begin(), run.end());
+}
+
+void PathBuilder::follow_left_out(std::size_t from) {
+    for (std::size_t points = 0;;) {
+        std::vector<std::vector<PathPoint>> again(left_out_.begin() + static_cast<std::ptrdiff_t>(from),
+                                                  left_out_.end());
+        std::size_t still = 0;
+        for (const std::vector<PathPoint>& run : again) still += run.size();
+        if (still == 0 || still == points) return;
+        points = still;
+        left_out_.resize(from);
+        for (const std::vector<PathPoint>& run : again) follow(run);
     }
 }
 
@@ -477,18 +332,11 @@ std::size_t PathBuilder::follow_part(std::span<const PathPoint> run) {
     if (around_.standing == nullptr) {
         go_above(first);
         plunge(run.front().z);
-    } else {
-        const double most = plunges_ ? kPlunge : kScrape;
-        const bool from_side = around_.from_side && standing_middle(first) > to_mm(run.front().z) + most &&
-                               enter_from_side(run.front());
-        if (!from_side && !go_straight(first, run.front().z)) go_above(first);
-        if (!from_side && !enter(run)) {
-            if (around_.no_way_in != nullptr)
-                around_.no_way_in->push_back({to_mm(first.x), to_mm(first.y), to_mm(run.front().z)});
-            std::size_t past = 1;
-            while (past < run.size() && run[past].z == run.front().z) ++past;
-            return past;
-        }
+    } else if (!enter(run)) {
+        std::size_t past = 1;
+        while (past < run.size() && run[past].z == run.front().z) ++past;
+        leave_out(run.first(past));
+        return past;
     }
     for (std::size_t k = 1; k < run.size(); ++k) {
         if (comes_down_on_stock(run[k])) return k;
@@ -521,6 +369,10 @@ void PathBuilder::retract() {
 }
 
 bool PathBuilder::finish() {
+    if (around_.no_way_in != nullptr)
+        for (const std::vector<PathPoint>& run : left_out_)
+            around_.no_way_in->push_back({to_mm(run.front().x), to_mm(run.front().y), to_mm(run.front().z)});
+    left_out_.clear();
     if (!started_) return false;
     retract();
     add(x_, y_, clearance_, 0);

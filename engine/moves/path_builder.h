@@ -30,8 +30,8 @@ struct Surroundings {
     double deepest = 0;          ///< mm that a run may cut at once; 0: any
     bool from_side =
         false;  ///< comes from beside a run where that is possible, rather than on a helix or a ramp
-    /// Gets where a run begins that was left out: neither helix nor ramp has room, and the tool does not cut
-    /// straight down.
+    /// Gets where a run begins that was left out in the end: neither helix nor ramp has room, and the tool
+    /// does not cut straight down.
     std::vector<std::array<double, 3>>* no_way_in = nullptr;
 };
 
@@ -62,6 +62,11 @@ public:
     /// in, the run is first followed higher up; where that has no way in either, it is left out. Every point
     /// of the run must be free, and so must be what lies straight above it (as of a drop or a level contour).
     void follow(std::span<const PathPoint> run);
+    /// How many runs, or parts of runs, were left out so far.
+    [[nodiscard]] std::size_t left_out() const { return left_out_.size(); }
+    /// Follows those that were left out since there were `from` of them, as long as that brings some of them
+    /// in: what was cut after them may have made room.
+    void follow_left_out(std::size_t from);
     /// The steepest slope on which the tool may go down round and round a closed ring (its first point is
     /// repeated at the end); 0 where the ring is so small that its core would leave a post.
     [[nodiscard]] double slope_around(std::span<const PathPoint> ring) const;
@@ -110,6 +115,22 @@ public:
     static constexpr double kLongestWay = 40.0;  ///< mm that it stays down; above, lifting is quicker
 
 private:
+    // Where the tool is, and after which move.
+    struct Mark {
+        std::size_t moves = 0;
+        Move last;
+        std::int32_t x = 0, y = 0, z = 0, above = 0;
+        bool started = false, down = false;
+    };
+    struct Helix {
+        std::vector<std::array<double, 2>> circle;  // mm, its first place again at the end
+        double slope = 0, radius = 0;               // mm
+    };
+    [[nodiscard]] Mark here() const;
+    void go_back(const Mark& mark);
+    [[nodiscard]] std::optional<Helix> helix(std::array<double, 2> middle, double radius, double ux,
+                                             double uy, std::int32_t z, bool known) const;
+    bool wind_down(const Helix& helix, const PathPoint& end);
     void add(std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t feed);
     void learn();
     [[nodiscard]] CutterShape middle() const;
@@ -124,10 +145,16 @@ private:
     void descend(const PathPoint& to);
     void land(std::int32_t z);
     [[nodiscard]] bool enter(std::span<const PathPoint> run);
+    void leave_out(std::span<const PathPoint> run);
     [[nodiscard]] bool enter_on_helix(std::span<const PathPoint> run);
     [[nodiscard]] bool enter_on_ramp(std::span<const PathPoint> run);
     [[nodiscard]] std::optional<Point2> place_beside(const PathPoint& first);
     [[nodiscard]] bool enter_from_side(const PathPoint& first);
+    [[nodiscard]] bool enter_beside(const PathPoint& first);
+    [[nodiscard]] bool is_free(const PathPoint& p) const;
+    bool wind_down_around(const PathPoint& middle, double ux, double uy, const PathPoint& to);
+    bool ramp_down_from(const PathPoint& from, const PathPoint& to);
+    bool ramp_down(std::vector<PathPoint> stretch, double length);
     [[nodiscard]] bool go_straight(Point2 to, std::int32_t z);
     [[nodiscard]] bool part_leaves_way(Point2 from, Point2 to, std::int32_t z) const;
     Operation& operation_;
@@ -141,6 +168,7 @@ private:
     bool started_ = false, down_ = false, plunges_ = false, face_ = false;
     double core_ = 0, recess_ = 0;  // mm: the core's radius, and how much may stand under it
     double ramp_limit_deg_ = 90;
+    std::vector<std::vector<PathPoint>> left_out_;
 };
 
 }  // namespace slabwright

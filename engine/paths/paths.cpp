@@ -118,6 +118,14 @@ void report_no_way_in(const LayerCut& cut, LayerResult& result) {
          cut.no_way_in.front()});
 }
 
+// mm, of the cutters that work in a layer.
+double thinnest_radius(const LayerTools& tools) {
+    double thinnest = std::min(tools.rough.diameter, tools.finish.diameter);
+    for (const std::vector<Tool>* more : {&tools.semi_rough, &tools.rest})
+        for (const Tool& t : *more) thinnest = std::min(thinnest, t.diameter);
+    return thinnest / 2;
+}
+
 // mm: waste that is thicker is cut in steps.
 constexpr double kWaste = 1.0;
 
@@ -148,7 +156,8 @@ public:
                alpha_map(context, layer.mesh, layer.floor_below, layer.z_top),
                nullptr,
                {}},
-          standing_(layer.stock_min, layer.stock_max, std::min(cut_.stock_top, layer.z_top)) {
+          standing_(layer.stock_min, layer.stock_max, std::min(cut_.stock_top, layer.z_top),
+                    thinnest_radius(tools_)) {
         cut_.standing = &standing_;
         const double facets_mm2 = static_cast<double>(cut_.solid.facets.size()) /
                                   std::max(1.0, (layer.stock_max[0] - layer.stock_min[0]) *

@@ -141,11 +141,13 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
     const std::size_t at_once = std::min<std::size_t>(reach.size(), context.threads());
     const std::uint64_t held = std::accumulate(
         reach.begin(), reach.begin() + static_cast<std::ptrdiff_t>(at_once), std::uint64_t{0});
+    double thinnest = 1e9;
+    for (const Tool& t : plan.job.tools) thinnest = std::min(thinnest, t.diameter);
     constexpr std::uint64_t stands =
         3;  // what stands, and two earlier states of it while one way of cutting is held against another
     return held * (sizeof(SolidFacet) + 16 + 3 * sizeof(Index3)) +
            static_cast<std::uint64_t>(3 * plan_view_mm2(plan)) * (sizeof(Move) + 64) +
-           (stands * Standing::bytes(plan.stock_min, plan.stock_max) +
+           (stands * Standing::bytes(plan.stock_min, plan.stock_max, thinnest / 2) +
             LayerStock::bytes(plan.job, plan_view_mm2(plan))) *
                at_once;
 }

@@ -16,19 +16,19 @@ constexpr std::size_t kTable = 512;
 
 }  // namespace
 
-double Standing::cell_size(std::array<double, 2> min, std::array<double, 2> max) {
-    return std::max(kFinestCell,
+double Standing::cell_size(std::array<double, 2> min, std::array<double, 2> max, double thinnest) {
+    return std::max(std::min(kCell, kCellShare * thinnest),
                     std::sqrt((max[0] - min[0]) * (max[1] - min[1]) / static_cast<double>(kMostCells)));
 }
 
-std::uint64_t Standing::bytes(std::array<double, 2> min, std::array<double, 2> max) {
-    const double cell = cell_size(min, max);
+std::uint64_t Standing::bytes(std::array<double, 2> min, std::array<double, 2> max, double thinnest) {
+    const double cell = cell_size(min, max, thinnest);
     return static_cast<std::uint64_t>(std::ceil((max[0] - min[0]) / cell)) *
            static_cast<std::uint64_t>(std::ceil((max[1] - min[1]) / cell)) * sizeof(float);
 }
 
-Standing::Standing(std::array<double, 2> min, std::array<double, 2> max, double top)
-    : cell_(cell_size(min, max)),
+Standing::Standing(std::array<double, 2> min, std::array<double, 2> max, double top, double thinnest)
+    : cell_(cell_size(min, max, thinnest)),
       d_(cell_ * std::sqrt(0.5) + 1e-6),
       x0_(min[0] + cell_ / 2),
       y0_(min[1] + cell_ / 2),

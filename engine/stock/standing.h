@@ -23,9 +23,10 @@ namespace slabwright {
 /// giving them in another order, keeps the bound a bound.
 class Standing {
 public:
-    /// The rectangle [min, max] of stock (mm), full up to `top`; cells of kFinestCell, or larger ones where
-    /// there would be more than kMostCells.
-    Standing(std::array<double, 2> min, std::array<double, 2> max, double top);
+    /// The rectangle [min, max] of stock (mm), full up to `top`; cells of kCell, or finer ones that a thin
+    /// cutter still clears (kCellShare), or larger ones where there would be more than kMostCells.
+    /// @param thinnest radius of the cutters that cut it, mm
+    Standing(std::array<double, 2> min, std::array<double, 2> max, double top, double thinnest = 1e9);
 
     /// The cutter goes straight from `from` to `to`, tips in mm.
     /// @param core radius of a flat cutter's middle that has no edge, mm: what it covers at both ends, and so
@@ -46,9 +47,11 @@ public:
                                   const std::array<double, 2>& b) const;
 
     [[nodiscard]] double cell() const { return cell_; }
-    [[nodiscard]] static std::uint64_t bytes(std::array<double, 2> min, std::array<double, 2> max);
+    [[nodiscard]] static std::uint64_t bytes(std::array<double, 2> min, std::array<double, 2> max,
+                                             double thinnest);
 
-    static constexpr double kFinestCell = 0.5;                           ///< mm
+    static constexpr double kCell = 0.5;        ///< mm
+    static constexpr double kCellShare = 0.25;  ///< of the thinnest cutter's radius, at most
     static constexpr std::uint64_t kMostCells = std::uint64_t{1} << 21;  ///< 8 MiB
 
 private:
@@ -59,7 +62,7 @@ private:
         double scale = 0;
         std::vector<float> height;
     };
-    static double cell_size(std::array<double, 2> min, std::array<double, 2> max);
+    static double cell_size(std::array<double, 2> min, std::array<double, 2> max, double thinnest);
     [[nodiscard]] HeightTable made_table(const CutterShape& cutter) const;
     /// The table of this cutter, made when it is first asked for; until the next call.
     [[nodiscard]] const HeightTable& table_of(const CutterShape& cutter) const;

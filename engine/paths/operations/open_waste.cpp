@@ -99,7 +99,6 @@ std::size_t cut_open_levels(const LayerCut& cut, const Tool& face, std::span<con
     Surroundings around = cut.around(face, &part);
     around.from_side = true;
     path.set_surroundings(around);
-    const std::size_t no_ways = cut.no_way_in.size();
     for (std::size_t l = 0; l < levels.size(); ++l) {
         const OpenLevel& level = levels[l];
         if (level.rings.pieces.empty()) continue;
@@ -109,7 +108,7 @@ std::size_t cut_open_levels(const LayerCut& cut, const Tool& face, std::span<con
         op.stepover = std::max(op.stepover, level.rings.widest_step());
         for (int pass = 1; pass <= passes; ++pass) {
             clear_from_afar(path, cut, lifted(level.rings, deep * (passes - pass) / passes));
-            if (cut.no_way_in.size() > no_ways) return l;
+            if (path.left_out() > 0) return l;
         }
     }
     path.finish();
