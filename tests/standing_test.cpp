@@ -19,6 +19,17 @@ constexpr double kTop = 19;
 
 double cell_bound(const Standing& standing, double x, double y) { return standing.top(1e-9, {x, y}, {x, y}); }
 
+// A cutter of half a millimetre clears no cell of half a millimetre; of those that are made for it, it does.
+TEST(Standing, IsAsFineAsTheThinnestCutter) {
+    for (const double radius : {0.25, 0.5, 1.0, 3.0}) {
+        Standing standing({0, 0}, {20, 20}, 10, radius);
+        standing.cut(flat_cutter(radius), {5, 10, 4}, {15, 10, 4});
+        for (double x = 5; x < 15; x += 0.3)
+            EXPECT_NEAR(standing.top(0.2 * radius, {x, 10}, {x, 10}), 4, 1e-4) << "radius " << radius;
+        EXPECT_NEAR(standing.top(0.2 * radius, {10, 10 + 1.3 * radius}, {10, 10 + 1.3 * radius}), 10, 1e-4);
+    }
+}
+
 }  // namespace
 
 TEST(Standing, IsNeverBelowTheExactStockAnywhere) {
@@ -131,8 +142,9 @@ TEST(Standing, BallsAreBoundedByTheirShape) {
 }
 
 TEST(Standing, IsBoundedInMemory) {
-    EXPECT_LE(Standing::bytes({0, 0}, {5000, 5000}), (Standing::kMostCells + 8192) * 4);
-    EXPECT_EQ(Standing::bytes({0, 0}, {10, 20}), 20 * 40 * 4);
+    EXPECT_LE(Standing::bytes({0, 0}, {5000, 5000}, 0.5), (Standing::kMostCells + 8192) * 4);
+    EXPECT_EQ(Standing::bytes({0, 0}, {10, 20}, 3), 20 * 40 * 4);
+    EXPECT_EQ(Standing::bytes({0, 0}, {10, 20}, 1), 40 * 80 * 4);
     const Standing big({0, 0}, {5000, 5000}, kTop);
     EXPECT_GT(big.cell(), 3);
 }
