@@ -400,6 +400,16 @@ TEST(OwnPost, AFolderTellsOfADamagedProgramOrPost) {
         spit(program, with(text, d.from, d.to));
         EXPECT_EQ(told(), d.code) << d.from << " > " << d.to;
     }
+    // The switch is named, not what stands before it.
+    spit(program, with(text, "M10 (DUST ON)", "M5 M10"));
+    try {
+        (void)verify_folder(context, out, {.source = source, .cell = 1});
+        ADD_FAILURE() << "a switch beside another word passes";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), "gcode.switch");
+        EXPECT_NE(std::string(error.what()).find("M10 beside other words"), std::string::npos)
+            << error.what();
+    }
     spit(program, text);
     const std::string post = out + "/post.toml";
     spit(post, kRouter + "# a word more\n");

@@ -157,9 +157,10 @@ bool ModalState::is_switch(int m) const {
 
 /// Which output it switches (P) is all that a switch may be told: nothing of the state depends on it.
 void ModalState::check_switch(const GcodeLine& line, const GcodePlace& place) const {
-    if (line.g.count > 0 || line.m.count > 1 || line.has_letter_beside('P'))
-        place.fail("gcode.switch", fmt::format("M{} beside other words: a switch stands on a line of its own",
-                                               gcode_number(*line.m.begin())));
+    if (line.g.count == 0 && line.m.count == 1 && !line.has_letter_beside('P')) return;
+    const int word = *std::find_if(line.m.begin(), line.m.end(), [&](int m) { return is_switch(m); });
+    place.fail("gcode.switch", fmt::format("M{} beside other words: a switch stands on a line of its own",
+                                           gcode_number(word)));
 }
 
 void ModalState::dwell(const GcodeLine& line, const GcodePlace& place) {
