@@ -70,20 +70,23 @@ int spare(int a) {
 """)
 (root / "tests/area_test.cpp").write_text("""#include <cstdio>
 #include "kernels/area.h"
+int none();
 int main() {
     std::puts("[ RUN      ] Area.OfARectangle");
-    const bool well = area(6, 3) == 18 && twice(3) == 6 && spare(0) < 0;
+    const bool well = area(6, 3) == 18 && twice(3) == 6 && spare(none()) < 0;
     std::puts(well ? "[       OK ] Area.OfARectangle (0 ms)" : "[  FAILED  ] Area.OfARectangle (0 ms)");
     return well ? 0 : 1;
 }
 """)
+(root / "tests/support.cpp").write_text("int none() { return 0; }\n")
 (root / "CMakeLists.txt").write_text("""cmake_minimum_required(VERSION 3.25)
 project(area LANGUAGES CXX)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 add_library(kernels STATIC kernels/area.cpp)
 target_include_directories(kernels PUBLIC ${PROJECT_SOURCE_DIR})
+add_library(support OBJECT tests/support.cpp)
 add_executable(area_test tests/area_test.cpp)
-target_link_libraries(area_test PRIVATE kernels)
+target_link_libraries(area_test PRIVATE kernels support)
 """)
 
 
