@@ -195,6 +195,9 @@ TEST(Report, HoldsWhatLiesInTheFolder) {
     EXPECT_FALSE(seen.contains("model"));
     EXPECT_EQ(light.find("<canvas"), std::string::npos);
     EXPECT_LT(light.size(), 1'000'000u);
+    report(one, out, kStl);
+    EXPECT_TRUE(data_of(slurp(fs::path(out) / "report.html")).contains("model"))
+        << "where nothing else is asked";
     // What verification has read makes the same page as what the report reads.
     const std::string checked = folder / "checked";
     (void)write_verified(one, planned, checked, kStl, 0.5);
