@@ -210,7 +210,7 @@ TEST(Plunge, NoRunCutsDeeperThanItMay) {
     std::uniform_real_distribution<double> unit(0, 1);
     std::size_t cuts = 0;
     for (int round = 0; round < 30; ++round) {
-        const Tool& tool = cored_tools()[1];
+        const Tool tool = cored_tools()[1];
         Bench bench(tool);
         PathBuilder path(bench.operation, tool, 3000, kTop + 10, kTop + 2);
         Surroundings around = bench.cut.around(tool, &bench.part);
@@ -248,7 +248,7 @@ TEST(Plunge, NoRunCutsDeeperThanItMay) {
 
 // Over a part of a long straight way more stands than may be cut at once: all of it is cut, there in steps.
 TEST(Plunge, NoneOfAWayIsLeftOutWhereMoreStandsOverIt) {
-    const Tool& tool = cored_tools()[1];
+    const Tool tool = cored_tools()[1];
     Bench bench(tool);
     const double r = tool.diameter / 2, y = -60, z = 7;
     bench.slot(r + 2, {-160, y, 10}, {0, y, 10});
@@ -316,7 +316,7 @@ TEST(Plunge, ANarrowRoomIsEnteredBesideItsRuns) {
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> unit(0, 1);
     for (int round = 0; round < 60; ++round) {
-        const Tool& tool = cored_tools()[1];
+        const Tool tool = cored_tools()[1];
         Bench bench(tool);
         const double r = tool.diameter / 2, x = 50 + 60 * unit(random), y = 200 * unit(random) - 100,
                      turn = 2 * std::numbers::pi * unit(random), length = (1 + 3 * unit(random)) * r,
@@ -346,7 +346,7 @@ TEST(Plunge, ANarrowRoomIsEnteredBesideItsRuns) {
 // A short run in a crack as wide as the cutter, too short for its core, is left out until another comes that
 // way from farther off.
 TEST(Plunge, WhatWasLeftOutIsFollowedOnceThereIsRoom) {
-    const Tool& tool = cored_tools()[3];
+    const Tool tool = cored_tools()[3];
     const auto at = [](double along) { return PathPoint{to_units(80 + along), to_units(10), to_units(8)}; };
     const std::vector<std::vector<PathPoint>> runs{{at(0), at(0.3)}, {at(2), at(60)}};
     for (const bool both : {false, true}) {

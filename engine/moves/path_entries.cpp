@@ -45,8 +45,8 @@ void PathBuilder::go_back(const Mark& mark) {
 
 // To the start of a run and down to it. A slice along a wall is no plunge: only what stands under the middle
 // of the cutter asks for a helix or a ramp; of a short way down, what no edge has passed over on the ways
-// before it. Says whether there was a way in; where there was none, nothing was moved but through air at the
-// height of both.
+// before it. Says whether there was a way in. Where there was none, the tool is where it was, or went
+// straight to over the start through air.
 bool PathBuilder::enter(std::span<const PathPoint> run) {
     const PathPoint& first = run.front();
     const Point2 at{first.x, first.y};
