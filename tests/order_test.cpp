@@ -33,7 +33,8 @@ TEST(NearestRuns, AgreesWithBruteForce) {
                 beginnings.push_back({{u(random), u(random)}, {u(random), u(random)}, k, p});
         std::vector<char> done(runs, 0);
         NearestRuns left(beginnings, runs);
-        for (std::uint32_t k = 0; k < runs; ++k) {
+        std::uint32_t restored = 0;
+        for (std::uint32_t k = 0; k < runs + restored; ++k) {
             ASSERT_FALSE(left.empty());
             const Point2 at{u(random), u(random)};
             const Beginning found = left.nearest(at);
@@ -47,6 +48,13 @@ TEST(NearestRuns, AgreesWithBruteForce) {
             EXPECT_EQ(found.at, best->at);
             done[found.run] = 1;
             left.remove(found.run);
+            // Some that were taken out are put back in.
+            if (const auto back = static_cast<std::uint32_t>(random() % runs);
+                restored < 100 && done[back] != 0) {
+                done[back] = 0;
+                left.restore(back);
+                ++restored;
+            }
         }
         EXPECT_TRUE(left.empty());
     }

@@ -68,6 +68,15 @@ void NearestRuns::remove(std::uint32_t run) {
     }
 }
 
+void NearestRuns::restore(std::uint32_t run) {
+    for (std::uint32_t k = starts_[run]; k < starts_[run + 1]; ++k) {
+        const std::uint32_t node = members_[k];
+        if (!gone_[node]) continue;
+        gone_[node] = 0;
+        for (std::uint32_t up = node; up != kNone; up = parent_[up]) ++left_[up];
+    }
+}
+
 std::vector<Beginning> nearest_order(std::vector<Beginning> beginnings, std::size_t runs, Point2 at) {
     NearestRuns left(std::move(beginnings), runs);
     std::vector<Beginning> order;

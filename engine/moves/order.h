@@ -26,6 +26,8 @@ public:
     [[nodiscard]] Beginning nearest(Point2 to) const;
     /// Takes a run out with all of its beginnings.
     void remove(std::uint32_t run);
+    /// Puts a run that was taken out back in.
+    void restore(std::uint32_t run);
 
 private:
     static constexpr std::uint32_t kNone = UINT32_MAX;

@@ -93,7 +93,7 @@ public:
         const DropIndex ball(cut_.solid, ball_cutter(r_));
         const DropIndex flat(cut_.solid, flat_cutter(cut_.layer.tools.rough.diameter / 2 - 0.02));
         ball_ = &ball, flat_ = &flat;
-        const Slide slide{&ball, true, chord_, cut_.layer.z_top, 3};
+        const Slide slide{.part = &ball, .chord = chord_, .top = cut_.layer.z_top, .hops = true};
         std::vector<std::vector<std::vector<PathPoint>>> runs(curves.size());
         parallel_each(cut_.context, curves.size(), [&](std::size_t c) {
             for (std::size_t l = 0; l + 1 < curves[c].starts.size(); ++l)

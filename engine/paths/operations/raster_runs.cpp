@@ -437,7 +437,10 @@ private:
 }  // namespace
 
 Slide raster_slide(const LayerCut& cut, const DropIndex& ball) {
-    return {&ball, true, safe_chord_mm(ball.cutter().radius, cut.job.tolerances.gouge), cut.layer.z_top, 3};
+    return {.part = &ball,
+            .chord = safe_chord_mm(ball.cutter().radius, cut.job.tolerances.gouge),
+            .top = cut.layer.z_top,
+            .hops = true};
 }
 
 RasterRuns raster_runs(const LayerCut& cut, const RasterFacets& facets, const RasterLines& raster,

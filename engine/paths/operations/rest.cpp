@@ -20,7 +20,11 @@ namespace {
 constexpr double kOver = 0.005;  // mm by which a straight way may leave the places between its ends, and cut,
 constexpr double kOverShare = 0.25;  // and what share of the gouge tolerance
 constexpr double kSteepestWay = 3;   // slope up which it goes straight; up walls by steps
+constexpr double kLift = 0.02;       // mm by which a straight way may stand over them,
+constexpr double kLiftShare = 0.25;  // and what share of the pass's limit
 constexpr double kBridge = 3.0;      // mm between two useful stretches that are travelled along the surface
+
+double over_of(const Job& job) { return std::min(kOver, kOverShare * job.tolerances.gouge); }
 
 class RestPaths : private RestLines {
 public:
@@ -91,50 +95,67 @@ private:
         close();
     }
 
+    // A flat end mill goes up and down slopes as straight as it may, not by steps, no more than kLift over
+    // the places of the run.
     std::vector<PathPoint> points_along(const std::vector<Place>& run) const {
         std::vector<PathPoint> points;
-        for (std::size_t i = 0, straight = 0; i < run.size(); ++i) {
-            const PathPoint p{run[i].x, run[i].y, run[i].z};
-            // A flat end mill goes up a slope as straight as it may, not by steps.
-            if (i > 0 && i <= straight) {
-                if (i == straight) points.push_back(p);
-            } else {
-                append(points, p);
+        const bool straight = !ball_ && !pass_.in_steps;
+        for (std::size_t i = 0; i < run.size(); ++i) {
+            append(points, {run[i].x, run[i].y, run[i].z});
+            while (straight) {
+                const auto [j, z] = farthest_straight(run, i, points.back().z);
+                if (j == i) break;
+                points.push_back({run[j].x, run[j].y, z});
+                i = j;
             }
-            if (i >= straight && !ball_ && !pass_.in_steps) straight = farthest_straight(run, i);
         }
         return points;
     }
 
-    // The farthest place of a run that a flat end mill may go straight to from the place i, which is itself
-    // where there is none: it grows by doubling, then is looked for between what is free and what is not.
-    std::size_t farthest_straight(const std::vector<Place>& run, std::size_t i) const {
-        if (i + 1 >= run.size() || run[i].z == run[i + 1].z) return i;
-        const double over = std::min(kOver, kOverShare * cut_.job.tolerances.gouge);
-        const auto is_straight = [&](std::size_t j) {
-            const Point3 a = middle_of(run[i]), b = middle_of(run[j]);
-            const double l = std::hypot(b[0] - a[0], b[1] - a[1]);
-            if (std::abs(b[2] - a[2]) > kSteepestWay * l) return false;
-            for (std::size_t k = i + 1; k < j; ++k) {
-                const Point3 p = middle_of(run[k]);
-                const double share = std::hypot(p[0] - a[0], p[1] - a[1]) / l;
-                if (length(minus(plus(a, minus(b, a), share), p)) > over) return false;
-            }
-            return index_->way_is_free(a, b, over);
-        };
-        std::size_t good = i, bad = run.size();
-        for (std::size_t step = 1; i + step < run.size(); step *= 2) {
-            if (!is_straight(i + step)) {
-                bad = i + step;
-                break;
-            }
-            good = i + step;
+    struct Straight {
+        std::size_t end;  // of a run's places
+        std::int32_t z;   // 0.1 µm, there
+    };
+
+    // The farthest place of a run, at the lowest height there, that a flat end mill may go straight to from
+    // height z at the place i; i itself where there is none.
+    Straight farthest_straight(const std::vector<Place>& run, std::size_t i, std::int32_t z) const {
+        Straight found{i, z};
+        if (i + 1 >= run.size() || (z == run[i].z && z == run[i + 1].z)) return found;
+        const double over = over_of(cut_.job), lift = std::min(kLift, kLiftShare * pass_.limit);
+        const Point3 a{to_mm(run[i].x), to_mm(run[i].y), to_mm(z)};
+        // Slopes that lead to each place between its own height and the lift over it, and so over those
+        // before it.
+        std::vector<double> slopes;
+        double low = -kSteepestWay, high = kSteepestWay;
+        for (std::size_t j = i + 1; j < run.size(); ++j) {
+            const Point3 p = middle_of(run[j]);
+            const double l = std::hypot(p[0] - a[0], p[1] - a[1]);
+            if (!(l > 0)) break;
+            low = std::max(low, (p[2] - a[2]) / l);
+            high = std::min(high, (p[2] + lift - a[2]) / l);
+            if (low > high) break;
+            slopes.push_back(low);
         }
-        while (good > i && bad - good > 1) {
-            const std::size_t between = good + (bad - good) / 2;
-            (is_straight(between) ? good : bad) = between;
+        for (std::size_t steps = slopes.size(); steps > 0; steps /= 2) {
+            const Point3 p = middle_of(run[i + steps]);
+            const double l = std::hypot(p[0] - a[0], p[1] - a[1]);
+            const Point3 b{p[0], p[1], std::max(p[2], a[2] + slopes[steps - 1] * l)};
+            if (lies_along(run, i, i + steps, over) && index_->way_is_free(a, b, over))
+                return {i + steps, to_units(b[2]) + (b[2] > p[2] ? 1 : 0)};
         }
-        return good;
+        return found;
+    }
+
+    // Whether the places between two of a run lie on the straight line between these, seen from above.
+    static bool lies_along(const std::vector<Place>& run, std::size_t i, std::size_t j, double over) {
+        const Point3 a = middle_of(run[i]), b = middle_of(run[j]);
+        const double l = std::hypot(b[0] - a[0], b[1] - a[1]), c = (b[0] - a[0]) / l, s = (b[1] - a[1]) / l;
+        for (std::size_t k = i + 1; k < j; ++k) {
+            const Point3 p = middle_of(run[k]);
+            if (std::abs(c * (p[1] - a[1]) - s * (p[0] - a[0])) > over) return false;
+        }
+        return true;
     }
 
     static Point3 middle_of(const Place& p) { return {to_mm(p.x), to_mm(p.y), to_mm(p.z)}; }
@@ -153,7 +174,15 @@ private:
         PathBuilder path(op, tool_, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed),
                          cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
         path.set_surroundings(cut_.around(tool_, index_));
-        const Slide slide{index_, ball_, chord_, cut_.layer.z_top, kBridge, under_};
+        const Slide slide{.part = index_,
+                          .ball = ball_,
+                          .chord = chord_,
+                          .top = cut_.layer.z_top,
+                          .near = kBridge,
+                          .under = under_,
+                          .hops = !pass_.in_steps,
+                          .steepest = kSteepestWay,
+                          .over = over_of(cut_.job)};
         if (!pass_.in_steps) {
             cut_.context.throw_if_cancelled();
             follow_nearest(path, chained(runs, slide));

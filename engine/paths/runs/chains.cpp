@@ -16,10 +16,19 @@ double way(const PathPoint& a, Point2 b) {
     return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
 }
 
-// The places between two along the surface; none where the way climbs onto the top.
+// Whether a flat end mill may go from one place to another as straight as a slope.
+bool slope_is_free(const PathPoint& from, const PathPoint& to, const Slide& slide) {
+    const Vec3d a{to_mm(from.x), to_mm(from.y), to_mm(from.z)}, b{to_mm(to.x), to_mm(to.y), to_mm(to.z)};
+    return std::abs(b[2] - a[2]) <= slide.steepest * std::hypot(b[0] - a[0], b[1] - a[1]) &&
+           slide.part->way_is_free(a, b, slide.over);
+}
+
+// The places from one to another, the first left out; none where the way along the surface climbs onto the
+// top.
 std::optional<std::vector<PathPoint>> slide_between(const PathPoint& from, const PathPoint& to,
                                                     const Slide& slide) {
     std::vector<PathPoint> link{from};
+    std::int32_t highest = std::max(from.z, to.z);
     const auto n =
         static_cast<std::size_t>(std::ceil(way(from, flat_of(to)) / (0.75 * slide.chord * kUnitsPerMm)));
     for (std::size_t i = 1; i < n; ++i) {
@@ -31,9 +40,17 @@ std::optional<std::vector<PathPoint>> slide_between(const PathPoint& from, const
                      rest = slide.part->drop(to_mm(p.x), to_mm(p.y), matters).tip_z + slide.under;
         if (rest >= slide.top - 1e-3) return std::nullopt;
         p.z = static_cast<std::int32_t>(std::ceil(std::max(lerp, rest * kUnitsPerMm))) + 1;
+        highest = std::max(highest, p.z);
         append_free(link, p, slide);
     }
     append_free(link, to, slide);
+    if (slide.hops && link.size() > n + 1) {  // by steps
+        link = {from};
+        if (slide.ball || !slope_is_free(from, to, slide))
+            for (const PathPoint& p : {PathPoint{from.x, from.y, highest}, {to.x, to.y, highest}})
+                if (!(p == link.back()) && !(p == to)) link.push_back(p);
+        link.push_back(to);
+    }
     link.erase(link.begin());
     return link;
 }

@@ -17,6 +17,11 @@ struct Slide {
     double top = 0;    ///< mm: it does not climb onto this height, the finished top
     double near = 3;   ///< mm that it goes at most
     double under = 0;  ///< mm that the tip of `part`'s cutter lies under this one's
+    /// Where the way along the surface is no straight one, it goes straight up, along and down; a flat end
+    /// mill on one slope, if that is no steeper than `steepest` and cuts no more than `over` mm. False: by
+    /// steps along the surface, so that a cutter that cannot plunge comes from beside what stands.
+    bool hops = false;
+    double steepest = 3, over = 0.0025;
 };
 
 /// Appends a free place to a line whose last place is free: straight where that is short enough to stay out

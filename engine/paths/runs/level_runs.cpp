@@ -1,8 +1,10 @@
 #include "engine/paths/runs/level_runs.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <tuple>
+#include <compare>
+#include <cstdint>
 
 #include "engine/moves/order.h"
 #include "engine/paths/runs/leads.h"
@@ -13,116 +15,120 @@ namespace slabwright {
 
 namespace {
 
-// Runs that lie within `reach` (0.1 µm) of each other, on whichever level, belong to one region, and so do
-// those that a chain of such neighbours joins (some that lie up to four times as far apart as well). Regions
-// may be cut one after the other, each from its top down. Gives the lowest run of each run's region, runs
-// counted through all levels.
-std::vector<std::uint32_t> regions(const std::vector<std::vector<LevelRun>>& levels, std::int32_t reach) {
-    std::vector<std::uint32_t> parent;
-    auto root = [&](std::uint32_t k) {
-        while (parent[k] != k) k = parent[k] = parent[parent[k]];
-        return k;
-    };
-    auto join = [&](std::uint32_t a, std::uint32_t b) {
-        a = root(a);
-        b = root(b);
-        parent[std::max(a, b)] = std::min(a, b);
-    };
+// Which runs, counted through all levels from the top, wait for which: a run for those on higher levels that
+// lie within `reach` (0.1 µm) of it, some up to four times as far, for they may hold up wood over its cutter.
+// Of each place only the nearest level above is told; that has waited for those over it.
+class Waiting {
+public:
+    Waiting(const std::vector<std::vector<LevelRun>>& levels, std::int32_t reach) : reach_(reach) {
+        for (std::size_t l = 0; l < levels.size(); ++l)
+            for (const LevelRun& run : levels[l]) {
+                level_of_.push_back(static_cast<std::uint32_t>(l));
+                visit(run);
+            }
+        std::sort(visits_.begin(), visits_.end());
+        for_.assign(level_of_.size(), 0);
+        std::vector<std::array<std::uint32_t, 2>> pairs;  // higher run, lower run
+        for (const Visit& v : visits_)
+            for (std::int32_t x = v.x - 1; x <= v.x + 1; ++x)
+                for (std::int32_t y = v.y - 1; y <= v.y + 1; ++y) append_above(x, y, v.run, pairs);
+        std::sort(pairs.begin(), pairs.end());
+        pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+        starts_.assign(level_of_.size() + 1, 0);
+        for (const auto& [higher, lower] : pairs) ++starts_[higher + 1], ++for_[lower];
+        for (std::size_t k = 1; k < starts_.size(); ++k) starts_[k] += starts_[k - 1];
+        for (const auto& pair : pairs) lower_.push_back(pair[1]);
+    }
+
+    [[nodiscard]] bool waits(std::uint32_t run) const { return for_[run] > 0; }
+    /// The runs that waited for this one alone, once it is cut.
+    [[nodiscard]] std::vector<std::uint32_t> freed_by(std::uint32_t run) {
+        std::vector<std::uint32_t> freed;
+        for (std::uint32_t k = starts_[run]; k < starts_[run + 1]; ++k)
+            if (--for_[lower_[k]] == 0) freed.push_back(lower_[k]);
+        return freed;
+    }
+
+private:
     struct Visit {
         std::int32_t x, y;
         std::uint32_t run;
+        auto operator<=>(const Visit&) const = default;
     };
-    std::vector<Visit> cells;
-    auto cell = [&](double v) { return static_cast<std::int32_t>(std::floor(v / reach)); };
-    for (const std::vector<LevelRun>& level : levels)
-        for (const LevelRun& run : level) {
-            const auto id = static_cast<std::uint32_t>(parent.size());
-            parent.push_back(id);
-            for (std::size_t k = 0; k < run.points.size(); ++k) {
-                const PathPoint &p = run.points[k], &q = run.points[k == 0 ? 0 : k - 1];
-                const int steps = 1 + static_cast<int>(std::hypot(static_cast<double>(p.x) - q.x,
-                                                                  static_cast<double>(p.y) - q.y) /
-                                                       reach * 2);
-                for (int s = 0; s < steps; ++s) {
-                    const double t = static_cast<double>(s) / steps;
-                    const Visit v{cell(p.x + t * (static_cast<double>(q.x) - p.x)),
-                                  cell(p.y + t * (static_cast<double>(q.y) - p.y)), id};
-                    if (cells.empty() || cells.back().x != v.x || cells.back().y != v.y ||
-                        cells.back().run != id)
-                        cells.push_back(v);
-                }
+    void visit(const LevelRun& run) {
+        const auto id = static_cast<std::uint32_t>(level_of_.size() - 1);
+        const auto cell = [&](double v) { return static_cast<std::int32_t>(std::floor(v / reach_)); };
+        for (std::size_t k = 0; k < run.points.size(); ++k) {
+            const PathPoint &p = run.points[k], &q = run.points[k == 0 ? 0 : k - 1];
+            const int steps = 1 + static_cast<int>(std::hypot(static_cast<double>(p.x) - q.x,
+                                                              static_cast<double>(p.y) - q.y) /
+                                                   reach_ * 2);
+            for (int s = 0; s < steps; ++s) {
+                const double t = static_cast<double>(s) / steps;
+                const Visit v{cell(p.x + t * (static_cast<double>(q.x) - p.x)),
+                              cell(p.y + t * (static_cast<double>(q.y) - p.y)), id};
+                if (visits_.empty() || visits_.back() != v) visits_.push_back(v);
             }
         }
-    std::sort(cells.begin(), cells.end(), [](const Visit& a, const Visit& b) {
-        return std::tie(a.x, a.y, a.run) < std::tie(b.x, b.y, b.run);
-    });
-    auto first_of = [&](std::int32_t x, std::int32_t y) {
-        return std::lower_bound(cells.begin(), cells.end(), std::pair{x, y},
-                                [](const Visit& v, const std::pair<std::int32_t, std::int32_t>& at) {
-                                    return std::pair{v.x, v.y} < at;
-                                });
-    };
-    for (std::size_t k = 0; k < cells.size(); ++k) {
-        if (k > 0 && cells[k - 1].x == cells[k].x && cells[k - 1].y == cells[k].y) {
-            join(cells[k - 1].run, cells[k].run);
-            continue;
-        }
-        for (const auto& [dx, dy] : {std::pair{0, 1}, {1, -1}, {1, 0}, {1, 1}}) {
-            const auto near = first_of(cells[k].x + dx, cells[k].y + dy);
-            if (near != cells.end() && near->x == cells[k].x + dx && near->y == cells[k].y + dy)
-                join(near->run, cells[k].run);
-        }
     }
-    for (std::uint32_t k = 0; k < parent.size(); ++k) parent[k] = root(k);
-    return parent;
+    void append_above(std::int32_t x, std::int32_t y, std::uint32_t run,
+                      std::vector<std::array<std::uint32_t, 2>>& pairs) const {
+        // Runs of a cell stand in the order of their levels.
+        auto at = std::lower_bound(visits_.begin(), visits_.end(), Visit{x, y, run});
+        const auto is_here = [&] { return at != visits_.begin() && (at - 1)->x == x && (at - 1)->y == y; };
+        while (is_here() && level_of_[(at - 1)->run] == level_of_[run]) --at;
+        if (!is_here()) return;
+        for (const std::uint32_t level = level_of_[(at - 1)->run];
+             is_here() && level_of_[(at - 1)->run] == level; --at)
+            pairs.push_back({(at - 1)->run, run});
+    }
+
+    std::int32_t reach_;
+    std::vector<std::uint32_t> level_of_;
+    std::vector<Visit> visits_;
+    std::vector<std::uint32_t> for_;             // how many a run waits for
+    std::vector<std::uint32_t> starts_, lower_;  // by run, those that wait for it
+};
+
+// Where a run may begin: an open one, which has the part on its right, at its first point, a closed one at
+// points all around it.
+void append_beginnings(const LevelRun& run, std::uint32_t id, std::vector<Beginning>& beginnings) {
+    const std::vector<PathPoint>& points = run.points;
+    if (!run.closed) {
+        beginnings.push_back({{points[0].x, points[0].y}, {points.back().x, points.back().y}, id, 0});
+        return;
+    }
+    double since = kUnbounded;
+    for (std::uint32_t p = 0; p + 1 < points.size(); ++p) {
+        if (p > 0)
+            since += std::hypot(static_cast<double>(points[p].x) - points[p - 1].x,
+                                static_cast<double>(points[p].y) - points[p - 1].y);
+        if (since < 2 * kUnitsPerMm) continue;
+        since = 0;
+        const Point2 at{points[p].x, points[p].y};
+        beginnings.push_back({at, at, id, p});
+    }
 }
 
-// One level of one region, the nearest run first; `runs` has as many entries as there are beginnings of
-// theirs. Open runs keep their direction, with the part on the right; closed ones are begun at their point
-// nearest to the tool.
-void cut_level(PathBuilder& path, const LayerCut& cut, const DropIndex& part, double chord, bool leads,
-               std::vector<LevelRun*>& runs) {
-    std::vector<Beginning> beginnings;
-    for (std::uint32_t i = 0; i < runs.size(); ++i) {
-        const std::vector<PathPoint>& points = runs[i]->points;
-        if (!runs[i]->closed) {
-            beginnings.push_back({{points[0].x, points[0].y}, {points.back().x, points.back().y}, i, 0});
-            continue;
-        }
-        double since = kUnbounded;
-        for (std::uint32_t p = 0; p + 1 < points.size(); ++p) {
-            if (p > 0)
-                since += std::hypot(static_cast<double>(points[p].x) - points[p - 1].x,
-                                    static_cast<double>(points[p].y) - points[p - 1].y);
-            if (since < 2 * kUnitsPerMm) continue;
-            since = 0;
-            const Point2 at{points[p].x, points[p].y};
-            beginnings.push_back({at, at, i, p});
+// A run from one of its beginnings.
+void cut_run(PathBuilder& path, const LayerCut& cut, const DropIndex& part, double chord, bool leads,
+             const LevelRun& run, std::size_t place) {
+    std::vector<PathPoint> points = run.points;
+    if (!run.closed) {
+        if (leads) add_leads(path, cut, part, chord, points);
+    } else {
+        // Where there is no room for an arc, perhaps elsewhere around the contour.
+        constexpr std::size_t tries = 6;
+        const std::size_t n = run.points.size() - 1;
+        for (std::size_t attempt = 0; attempt <= tries; ++attempt) {
+            const std::size_t first = (place + attempt % tries * n / tries) % n;
+            points.assign(run.points.begin(), run.points.end() - 1);
+            std::rotate(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(first), points.end());
+            points.push_back(points.front());
+            if (!leads || add_leads(path, cut, part, chord, points)) break;
         }
     }
-    NearestRuns left(std::move(beginnings), runs.size());
-    while (!left.empty()) {
-        const Beginning next = left.nearest(path.at());
-        left.remove(next.run);
-        const LevelRun& run = *runs[next.run];
-        std::vector<PathPoint> points = run.points;
-        if (!run.closed) {
-            if (leads) add_leads(path, cut, part, chord, points);
-        } else {
-            // Where there is no room for an arc, perhaps elsewhere around the contour.
-            constexpr std::size_t tries = 6;
-            const std::size_t n = run.points.size() - 1;
-            for (std::size_t attempt = 0; attempt <= tries; ++attempt) {
-                const std::size_t first = (next.place + attempt % tries * n / tries) % n;
-                points.assign(run.points.begin(), run.points.end() - 1);
-                std::rotate(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(first),
-                            points.end());
-                points.push_back(points.front());
-                if (!leads || add_leads(path, cut, part, chord, points)) break;
-            }
-        }
-        path.follow(points);
-    }
+    path.follow(points);
 }
 
 }  // namespace
@@ -162,42 +168,23 @@ void append_level_runs(const Contours& contours, std::size_t c, std::int32_t z,
 void cut_levels(PathBuilder& path, const LayerCut& cut, const Tool& tool, const DropIndex& part,
                 std::vector<std::vector<LevelRun>>& levels, bool leads) {
     const double chord = safe_chord_mm(tool.diameter / 2, cut.job.tolerances.gouge);
-    const std::vector<std::uint32_t> region = regions(levels, to_units(tool.diameter));
-    struct Member {
-        std::uint32_t region;
-        std::size_t level;
-        LevelRun* run;
-    };
-    std::vector<Member> members;
-    for (std::size_t l = 0; l < levels.size(); ++l)
-        for (LevelRun& run : levels[l]) members.push_back({region[members.size()], l, &run});
-    std::stable_sort(members.begin(), members.end(), [](const Member& a, const Member& b) {
-        return std::tie(a.region, a.level) < std::tie(b.region, b.level);
-    });
-    std::vector<std::size_t> first;
+    Waiting waiting(levels, to_units(tool.diameter));
+    std::vector<const LevelRun*> runs;
     std::vector<Beginning> beginnings;
-    for (std::size_t k = 0; k < members.size(); ++k) {
-        if (k == 0 || members[k].region != members[k - 1].region) first.push_back(k);
-        if (members[k].level != members[first.back()].level) continue;
-        const PathPoint& p = members[k].run->points.front();
-        beginnings.push_back({{p.x, p.y},
-                              {p.x, p.y},
-                              static_cast<std::uint32_t>(first.size() - 1),
-                              static_cast<std::uint32_t>(k)});
-    }
-    NearestRuns left(std::move(beginnings), first.size());
-    first.push_back(members.size());
-    while (!left.empty()) {
-        const std::uint32_t next = left.nearest(path.at()).run;
-        left.remove(next);
-        std::vector<LevelRun*> level;
-        for (std::size_t k = first[next]; k < first[next + 1]; ++k) {
-            level.push_back(members[k].run);
-            if (k + 1 < first[next + 1] && members[k + 1].level == members[k].level) continue;
-            cut_level(path, cut, part, chord, leads, level);
-            level.clear();
+    for (const std::vector<LevelRun>& level : levels)
+        for (const LevelRun& run : level) {
+            append_beginnings(run, static_cast<std::uint32_t>(runs.size()), beginnings);
+            runs.push_back(&run);
         }
+    NearestRuns ready(std::move(beginnings), runs.size());
+    for (std::uint32_t k = 0; k < runs.size(); ++k)
+        if (waiting.waits(k)) ready.remove(k);
+    while (!ready.empty()) {
         cut.context.throw_if_cancelled();
+        const Beginning next = ready.nearest(path.at());
+        ready.remove(next.run);
+        cut_run(path, cut, part, chord, leads, *runs[next.run], next.place);
+        for (const std::uint32_t run : waiting.freed_by(next.run)) ready.restore(run);
     }
 }
 

@@ -18,10 +18,10 @@ struct LevelRun {
 void append_level_runs(const Contours& contours, std::size_t c, std::int32_t z,
                        const std::vector<char>& wanted, double tolerance, std::vector<LevelRun>& out);
 
-/// Cuts the runs of all levels, which come in the order in which they may be cut: runs within a tool's
-/// diameter of each other belong to one region, and regions are cut one after the other, the nearest first,
-/// each through all of its levels. Open runs keep their direction, with the part on the right; closed ones
-/// are begun where the tool is nearest, or where there is room for leads.
+/// Cuts the runs of all levels, which come in the order in which they may be cut: a run waits for those of
+/// earlier levels within a tool's diameter of it, and of all that wait for none the nearest to the tool is
+/// next (METHOD.md section 11, the order of levels). Open runs keep their direction, with the part on the
+/// right; closed ones are begun where the tool is nearest, or where there is room for leads.
 /// @param leads arcs into the cut and out of it (add_leads)
 void cut_levels(PathBuilder& path, const LayerCut& cut, const Tool& tool, const DropIndex& part,
                 std::vector<std::vector<LevelRun>>& levels, bool leads);
