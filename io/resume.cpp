@@ -125,8 +125,8 @@ public:
         status.after = progress_.after;
         if (known_) status.time_s = progress_.time_s;
         status.steps = in_force_.sequence.steps;
-        for (std::size_t i = progress_.state.done; i < status.steps.size(); ++i)
-            status.minutes_left += status.steps[i].seconds / 60;
+        for (const SequenceStep& step : std::span(status.steps).subspan(progress_.state.done))
+            status.minutes_left += step.seconds / 60;
         const double waited =
             known_ ? std::max(0.0, static_cast<double>(options_.now_s - progress_.time_s)) : 0;
         status.point = std::make_shared<const ResumePoint>(

@@ -33,11 +33,9 @@ void check_numbers(const std::vector<Program>& programs, const std::vector<Under
     std::set<std::string> told;
     const auto check = [&](const Program& program, const std::string& file) {
         if (program.number == 0) return;
-        const auto [other, first] = numbers.emplace(program.number, file);
+        const auto other = numbers.emplace(program.number, file).first;
         // Those of one folder are told where it is read.
-        if (first || other->second == file ||
-            fs::path(other->second).parent_path() == fs::path(file).parent_path())
-            return;
+        if (fs::path(other->second).parent_path() == fs::path(file).parent_path()) return;
         if (!told.insert(file).second) return;
         violations.push_back(
             {"program.number",

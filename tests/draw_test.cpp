@@ -8,6 +8,7 @@
 #include <numbers>
 #include <random>
 
+#include "io/write/draw_json.h"
 #include "io/write/report_draw.h"
 #include "kernels/access/wall_thickness.h"
 #include "kernels/errors.h"
@@ -153,6 +154,10 @@ TEST(Draw, InnerCornersAreToldByLength) {
     EXPECT_NEAR(report.corners[0].at[0], 20, 1e-4);
     EXPECT_NEAR(report.corners[0].at[1], 20, 1e-4);
     EXPECT_NEAR(report.corners[0].at[2], 10, 1e-4);
+    const std::string told = draw_text(report);
+    EXPECT_EQ(told.substr(told.find("  sharp")),
+              "  sharp inner corners: 40 mm in 1 place\n"
+              "                40.0 mm, 90.0 deg at x 20.0 y 20.0 z 10.0\n");
     EXPECT_TRUE(checked(step, {.corner_deg = 91}).corners.empty());
     EXPECT_TRUE(checked(shapes::box({0, 0, 0}, {60, 40, 30})).corners.empty()) << "its edges are outer ones";
     EXPECT_TRUE(checked(shapes::torus(60, 40, 10)).corners.empty()) << "round enough";

@@ -434,6 +434,7 @@ TEST(EngineRefusals, CuttersThatAreNone) {
     };
     EXPECT_EQ(dropped(2), "");
     EXPECT_EQ(dropped(0), "drop.radius");
+    EXPECT_EQ(dropped(1000), "");
     EXPECT_EQ(dropped(1001), "drop.radius");
     EXPECT_EQ(dropped(kNaN), "drop.radius");
 

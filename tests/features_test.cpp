@@ -20,6 +20,7 @@
 #include "kernels/features/section_areas.h"
 #include "kernels/mesh/facet_roles.h"
 #include "kernels/mesh/weld.h"
+#include "kernels/repair/triangulate.h"
 #include "kernels/slicing/slicing.h"
 #include "tests/support/seed.h"
 
@@ -433,6 +434,30 @@ TEST(Undercuts, AFlatIsMadeByItsBoundaryAndOtherwiseLeavesItsHeight) {
         EXPECT_NEAR(u[0].z, 10, 1e-6);
         EXPECT_EQ(u[0].facets.size(), 2u);
     }
+}
+
+// A steep roof, and under it, at √17 mm, a floor along it with a slot of 2√17 mm, right where a facet of the
+// roof has its centroid and nowhere near a corner, the middle of an edge or the tallest column.
+TEST(Undercuts, ASlotUnderTheCentroidOfARoofIsMeasured) {
+    const std::vector<std::array<float, 2>> p{
+        {0, 0},        {80, 0},  {80, 197}, {56, 197}, {42.25F, 142}, {50.25F, 140}, {49.75F, 138},
+        {41.75F, 140}, {14, 29}, {10, 30},  {52, 198}, {52, 210},     {0, 210}};
+    const auto at = [&](std::size_t i, float y) { return Vec3f{p[i % p.size()][0], y, p[i % p.size()][1]}; };
+    Facets t;
+    std::vector<Xyz> outline;
+    std::vector<std::uint32_t> around;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+        quad(t, at(i, 0), at(i, 30), at(i + 1, 30), at(i + 1, 0));
+        outline.push_back({p[i][0], 0, p[i][1]});
+        around.push_back(static_cast<std::uint32_t>(i));
+    }
+    for (const auto& f : clip_ears(outline, {around}, {0, 1, 0})) {
+        t.push_back({at(f[0], 0), at(f[1], 0), at(f[2], 0)});
+        t.push_back({at(f[0], 30), at(f[2], 30), at(f[1], 30)});
+    }
+    double thickest = 0;
+    for (const UnmadeUndercut& u : unmade(t, {210})) thickest = std::max(thickest, u.thickness_mm);
+    EXPECT_NEAR(thickest, 3 * std::sqrt(17), 1e-4);
 }
 
 TEST(Undercuts, SolidBelowEndsTheDepth) {

@@ -124,6 +124,34 @@ TEST(FibreRows, FacetsAndGroupsForbidNoMoreThanIsSaid) {
     EXPECT_GT(clipped, 1000U);
 }
 
+// What of a facet lies within a ball's reach over and under the lines is a polygon of it. No corner lies
+// elsewhere, not even one of those that only fill the row.
+TEST(FibreRows, WhatIsLeftOfAFacetLiesInIt) {
+    constexpr double r = 2, zc = 1;
+    // Of five corners, of four and of three, between z = −1 and 3.
+    for (const Vec3d& z : {Vec3d{-4, 0, 8}, Vec3d{-4, -2, 8}, Vec3d{-4, -2, 2}}) {
+        SolidFacet f{};
+        f.p = {Vec3d{0, 0, z[0]}, Vec3d{4, 0, z[1]}, Vec3d{0, 4, z[2]}};
+        const double along_x = (z[1] - z[0]) / 4, along_y = (z[2] - z[0]) / 4,
+                     length = std::hypot(along_x, along_y, 1);
+        f.normal = {-along_x / length, -along_y / length, 1 / length};
+        f.z_min = z[0], f.z_max = z[2];
+        for (const std::size_t u : {std::size_t{0}, std::size_t{1}}) {
+            BoxTerms box{};
+            TangentTerms t{};
+            facet_terms(f, u, r, zc, box, t);
+            ASSERT_EQ(t.corners, TangentTerms::kMostCorners);
+            for (std::size_t k = 0; k < t.corners; ++k) {
+                const double x = u == 0 ? t.u[k] : t.v[k], y = u == 0 ? t.v[k] : t.u[k],
+                             at = zc - t.z + t.dz[k];
+                EXPECT_NEAR(at, z[0] + along_x * x + along_y * y, 1e-12) << k;
+                EXPECT_TRUE(x >= -1e-12 && y >= -1e-12 && x + y <= 4 + 1e-12) << k;
+                EXPECT_TRUE(at >= zc - r - 1e-12 && at <= zc + r + 1e-12) << k;
+            }
+        }
+    }
+}
+
 // All facets of a group at once, against what each of them forbids; some overhang, and the last group has
 // fewer.
 TEST(FibreRows, FacetsOfAGroupForbidNoMoreThanIsSaid) {

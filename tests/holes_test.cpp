@@ -325,6 +325,20 @@ TEST(Holes, SayWhereTheirMouthAndStepsAre) {
     // Both walls, the shelf and the tip: 2·40 facets each, the tip 40.
     EXPECT_EQ(hole.facets.size(), 280u);
     EXPECT_NEAR(hole.chord_mm, 8 * (1 - std::cos(kPi / 40)), 1e-4);
+    // A drill of 6 mm makes the lower wall and the tip, a plain hole that begins at the shelf.
+    const std::optional<RoundHole> drilled = narrowest_part(hole);
+    ASSERT_TRUE(drilled);
+    EXPECT_EQ(drilled->kind, HoleKind::plain);
+    EXPECT_EQ(drilled->bottom, HoleBottom::cone);
+    EXPECT_NEAR(length(minus(drilled->mouth, {20, 20, 25})), 0, 1e-4);
+    EXPECT_NEAR(drilled->depth_mm, 15 + 0.6009 * 3, 1e-4);
+    EXPECT_NEAR(drilled->diameter_mm, 6, 1e-4);
+    EXPECT_NEAR(drilled->chord_mm, 3 * (1 - std::cos(kPi / 40)), 1e-4);
+    EXPECT_EQ(drilled->facets.size(), 120u);
+    ASSERT_EQ(drilled->steps.size(), 2u);
+    EXPECT_NEAR(drilled->steps[0].from_mm, 0, 1e-9);
+    EXPECT_NEAR(drilled->steps[0].to_mm, 15, 1e-4);
+    EXPECT_NEAR(drilled->steps[1].to_mm, 15 + 0.6009 * 3, 1e-4);
 }
 
 TEST(Holes, RefuseDiametersOutOfOrder) {

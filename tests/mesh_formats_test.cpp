@@ -411,6 +411,7 @@ TEST(MeshFormats, BadInputIsOneLineWithItsPlace) {
         {"x.obj", "v 0 0 0\nv 1 0\n", "obj.unparsable x.obj, line 2"},
         {"x.obj", "v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 4\r\n", "obj.index x.obj, line 4"},
         {"x.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 0\n", "obj.unparsable x.obj, line 4"},
+        {"x.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "obj.flat x.obj"},
         {"x.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "obj.polygon x.obj, line 3"},
         {"x.obj", "v 0 0 nan\n", "obj.non_finite x.obj, line 1"},
         {"x.obj", "v 0 0 1e7\n", "obj.absurd x.obj, line 1"},

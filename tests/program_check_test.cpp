@@ -183,6 +183,9 @@ TEST(ProgramCheck, EachFaultByItsName) {
     EXPECT_EQ(found("S18000", "S50"), "program.spindle:18");
     EXPECT_EQ(found("S18000", "S20000"), "program.spindle:18 program.spindle:18");
     EXPECT_EQ(found("F9000", "F9000\nS17000"), "program.spindle:21") << "before the last retract";
+    std::string fast = good;
+    fast.replace(fast.find("S18000"), 6, "S20000");
+    EXPECT_EQ(check(plan, fast)[0].size, 2000) << "over what the machine bears";
     EXPECT_EQ(found("F9000", "F9000\nM5"), "program.spindle:21");
     EXPECT_EQ(found("M5", "S17000\nM5"), "");
     EXPECT_EQ(found("X50 F9000", "S17000\nX50 F9000"), "program.spindle:20 program.spin_up:20");

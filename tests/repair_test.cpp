@@ -16,6 +16,7 @@
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/repair/rebuild.h"
+#include "kernels/repair/soup.h"
 #include "kernels/repair/triangulate.h"
 #include "kernels/repair/winding.h"
 #include "kernels/slicing/slicing.h"
@@ -247,6 +248,27 @@ TEST(Repair, EachDefectIsMendedToldAndTheSolidIsTheSame) {
     }
 }
 
+TEST(Repair, AHoleAroundAnIslandIsOneHoleOfItsArea) {
+    // A ring of a cube's side is missing, and what stands within stays where it is.
+    for (int axis = 0; axis < 3; ++axis) {
+        Facets cube = fine_box(8, {0, 0, 0}, {80, 80, 80});
+        std::erase_if(cube, [](const auto& f) {
+            const float away =
+                std::max(std::abs(middle(f, &Vec3f::x) - 40), std::abs(middle(f, &Vec3f::y) - 40));
+            return f[0].z == 80 && f[1].z == 80 && f[2].z == 80 && away > 10 && away < 30;
+        });
+        for (auto& f : cube)
+            for (Vec3f& v : f)
+                for (int k = 0; k < axis; ++k) v = {v.z, v.x, v.y};
+        const Mended result = mended(welded(cube));
+        EXPECT_TRUE(result.solid);
+        EXPECT_EQ(result[Defect::hole].count, 1u) << axis;
+        EXPECT_NEAR(result[Defect::hole].size, 60 * 60 - 20 * 20, 1e-3) << axis;
+        EXPECT_EQ(result[Defect::stray].count, 0u) << axis;
+        EXPECT_NEAR(test::volume(result.mesh.view()), 80 * 80 * 80, 1) << axis;
+    }
+}
+
 TEST(Repair, SeveralDefectsAtOnce) {
     const Facets good = sound();
     const double volume = test::volume(welded(good).view());
@@ -369,6 +391,21 @@ TEST(Repair, ASoupIsRebuiltAsASolidOrAsNothing) {
         solids += result.solid ? 1 : 0;
     }
     std::printf("%d of 20 soups became solids\n", solids);
+}
+
+TEST(Repair, EdgesAreSortedInTwiceTheirMemory) {
+    const FacetSoup soup{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                         {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}};
+    const std::uint64_t need = 2 * 12 * sizeof(EdgeUse);
+    Context enough({.threads = 1, .memory_bytes = need}), less({.threads = 1, .memory_bytes = need - 1});
+    EXPECT_EQ(sorted_uses(enough, soup).size(), 12u);
+    EXPECT_EQ(enough.memory_charged(), 0u);
+    try {
+        (void)sorted_uses(less, soup);
+        ADD_FAILURE();
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), "memory.limit");
+    }
 }
 
 TEST(Repair, StopsWhenCancelled) {

@@ -400,6 +400,30 @@ TEST(SharedPrograms, TheSequenceRunsFiles) {
         }
 }
 
+TEST(SharedPrograms, EachOperationIsReadBackWithItsOwnStepdown) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "out";
+    Context context;
+    Job job;
+    job.machine.programs = ProgramSpan::layer;
+    const Plan made = plan(context, PatternSource(kModels + "half-sphere.stl"), job);
+    write(context, made, out);
+    const PlannedFolder planned = read_planned_folder(out, {});
+    std::size_t i = 0;
+    std::set<double> stepdowns;
+    for (const Layer& layer : made.layers) {
+        const std::vector<Program> programs = planned.read_file(i, {});
+        ASSERT_EQ(programs.size(), layer.operations.size()) << "a layer is one file";
+        for (std::size_t k = 0; k < programs.size(); ++k) {
+            EXPECT_NEAR(programs[k].planned_stepdown, layer.operations[k].stepdown, 6e-5) << k;
+            EXPECT_EQ(planned.read_program(i + k, {}).planned_stepdown, programs[k].planned_stepdown) << k;
+            stepdowns.insert(programs[k].planned_stepdown);
+        }
+        i += programs.size();
+    }
+    EXPECT_GE(stepdowns.size(), 2U) << "with none, and with some";
+}
+
 TEST(SharedPrograms, AFolderProvesItself) {
     for (const Post post : {Post::linuxcnc, Post::haas, Post::heidenhain, Post::grbl})
         for (const ProgramSpan span : {ProgramSpan::tool, ProgramSpan::layer}) {

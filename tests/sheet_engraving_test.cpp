@@ -243,6 +243,20 @@ TEST(SheetEngraving, ProofFindsWhatIsWrongInARoutersText) {
     EXPECT_EQ(changed.says(late), "sheets.engraving");
 }
 
+TEST(SheetEngraving, TheTextStatesWidthAndDepthToATenthOfAMicrometre) {
+    SheetsPlan plan;
+    plan.job = job_of(SheetHead::router);
+    plan.job.engraving.width = 0.80056;
+    plan.job.engraving.depth = 1.23456;
+    plan.pieces.resize(1);
+    plan.pieces[0].number = 1;
+    plan.pieces[0].engravings.resize(1);
+    plan.programs.resize(1);
+    plan.programs[0].pieces = {1};
+    const std::string text = sheet_program_text(plan, 0);
+    EXPECT_NE(text.find("(engraver tool 2 width 0.8006 depth 1.2346)\n"), std::string::npos) << text;
+}
+
 TEST(SheetEngraving, ProofFindsWhatIsWrongInALasersAndAJetsText) {
     Context context;
     const Mesh mesh = vase(context);

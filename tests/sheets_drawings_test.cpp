@@ -5,8 +5,11 @@
 
 #include <cctype>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
+
+#include "io/write/dxf_text.h"
 
 using namespace slabwright;
 
@@ -95,4 +98,26 @@ TEST(SheetsDrawings, DxfHasEachInItsLayer) {
     EXPECT_EQ(lines_of(loops_dxf(ring, "a label")), (Lines{{"CUT", 4}, {"HOLE", 3}}));
     EXPECT_NE(loops_dxf(ring, "a label").find("a label"), std::string::npos);
     EXPECT_NE(loops_dxf({}, "nothing").find("nothing"), std::string::npos);
+}
+
+TEST(SheetsDrawings, DxfIsWrittenWordForWord) {
+    const std::string_view layers[] = {"CUT", "DOWELS"};
+    DxfText text(at(0, -3), at(60, 40.5), layers);
+    const Point2 line[] = {at(1, 2), at(-3, 4.5)};
+    text.open_line("CUT", line);
+    text.circle("DOWELS", at(12, -0.25), 8.5);
+    text.label(at(7, 9), "a part", 5);
+    EXPECT_EQ(text.take(),
+              "0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1009\n9\n$INSUNITS\n70\n4\n"
+              "9\n$EXTMIN\n10\n0.0\n20\n-3.0\n9\n$EXTMAX\n10\n60.0\n20\n40.5\n0\nENDSEC\n"
+              "0\nSECTION\n2\nTABLES\n0\nTABLE\n2\nLAYER\n70\n2\n"
+              "0\nLAYER\n2\nCUT\n70\n0\n62\n1\n6\nCONTINUOUS\n"
+              "0\nLAYER\n2\nDOWELS\n70\n0\n62\n2\n6\nCONTINUOUS\n0\nENDTAB\n0\nENDSEC\n"
+              "0\nSECTION\n2\nENTITIES\n"
+              "0\nPOLYLINE\n8\nCUT\n66\n1\n10\n0.0\n20\n0.0\n30\n0.0\n70\n0\n"
+              "0\nVERTEX\n8\nCUT\n10\n1.0\n20\n2.0\n30\n0.0\n"
+              "0\nVERTEX\n8\nCUT\n10\n-3.0\n20\n4.5\n30\n0.0\n0\nSEQEND\n8\nCUT\n"
+              "0\nCIRCLE\n8\nDOWELS\n10\n12.0\n20\n-0.25\n30\n0.0\n40\n4.25\n"
+              "0\nTEXT\n8\nLABEL\n10\n7.0\n20\n9.0\n30\n0.0\n40\n5.0\n1\na part\n"
+              "0\nENDSEC\n0\nEOF\n");
 }

@@ -88,6 +88,36 @@ TEST(SurfaceFacets, LieWithinTheDeviation) {
     }
 }
 
+// Two edges of a facet are divided, and the third, on the border, is whole: whichever that is.
+TEST(SurfaceFacets, AFacetWithOneWholeEdgeIsDividedAsTheOthersAre) {
+    const ParametricSurface dome = [](double u, double v) {
+        return Point3{u, v, -0.01 * ((u - 3) * (u - 3) + (v - 4) * (v - 4))};
+    };
+    for (std::size_t first = 0; first < 3; ++first) {
+        SurfaceFacets mesh;
+        for (const auto& [u, v] :
+             {std::array{0.0, 0.0}, std::array{10.0, 0.0}, {4.0, 9.0}, {12.0, 11.0}, {-6.0, 8.0}}) {
+            mesh.at.push_back(dome(u, v));
+            mesh.uv.push_back({u, v});
+        }
+        const std::array<std::uint32_t, 3> middle{0, 1, 2};
+        mesh.facets = {
+            {middle[first], middle[(first + 1) % 3], middle[(first + 2) % 3]}, {3, 2, 1}, {4, 0, 2}};
+        const auto was = border(mesh);
+        (void)refine_on(dome, 0.15, mesh);
+        EXPECT_GT(mesh.facets.size(), 3U);
+        EXPECT_TRUE(border(mesh) == was);
+        double area = 0;
+        for (const Index3& f : mesh.facets) {
+            const auto &a = mesh.uv[f[0]], &b = mesh.uv[f[1]], &c = mesh.uv[f[2]];
+            const double twice = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+            EXPECT_GT(twice, 0);
+            area += twice / 2;
+        }
+        EXPECT_NEAR(area, 45 + 42 + 43, 1e-9) << first;
+    }
+}
+
 TEST(SurfaceFacets, WhatIsNearEnoughStays) {
     const ParametricSurface plane = [](double u, double v) { return Point3{u, v, 2 * u - v}; };
     SurfaceFacets mesh = patch(plane, 0, 100, 0, 50, 3);

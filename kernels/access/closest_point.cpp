@@ -207,8 +207,8 @@ std::vector<ClosestHit> ClosestPoint::query(Context& context, std::span<const Po
         return a.code != b.code ? a.code < b.code : a.index < b.index;
     });
     parallel_for(context, points.size(), 256, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i)
-            hits[order[i].index] = query(points[order[i].index], max_radius);
+        for (const Key& key : std::span(order).subspan(begin, end - begin))
+            hits[key.index] = query(points[key.index], max_radius);
     });
     return hits;
 }

@@ -61,19 +61,15 @@ std::vector<BoundaryLoop> boundary_loops(const FacetSoup& soup, std::span<const 
     const std::vector<Missing> missing = missing_edges(uses);
     std::vector<bool> gone(missing.size(), false);
     std::vector<std::uint32_t> on_path(soup.vertices.size(), kNoFacet);  // place in the path
-    const auto row = [&](std::uint32_t v) {
-        return std::lower_bound(missing.begin(), missing.end(), v,
-                                [](const Missing& m, std::uint32_t from) { return m.from < from; }) -
-               missing.begin();
-    };
     const auto next_from = [&](std::uint32_t previous, std::uint32_t v) {
         const Xyz p = soup.at(v), back = minus(soup.at(previous), p);
         const double back_length = length(back);
         std::size_t best = missing.size();
         double sharpest = -2;
-        for (auto i = static_cast<std::size_t>(row(v)); i < missing.size() && missing[i].from == v; ++i) {
+        for (const Missing& edge : std::ranges::equal_range(missing, v, {}, &Missing::from)) {
+            const auto i = static_cast<std::size_t>(&edge - missing.data());
             if (gone[i]) continue;
-            const Xyz ahead = minus(soup.at(missing[i].to), p);
+            const Xyz ahead = minus(soup.at(edge.to), p);
             const double lengths = length(ahead) * back_length;
             const double cosine = lengths > 0 ? inner(ahead, back) / lengths : 1;
             if (best == missing.size() || cosine > sharpest) best = i, sharpest = cosine;
