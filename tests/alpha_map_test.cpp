@@ -1,6 +1,7 @@
 // The α-map on solids whose slopes are known.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -98,4 +99,20 @@ TEST(AlphaMap, KnowsVerticalLayers) {
     // A layer of nothing but air has no walls, and so no vertical ones.
     EXPECT_FALSE(alpha_map(context, mesh.view(), 10, 20).vertical());
     EXPECT_THROW((void)alpha_map(context, mesh.view(), 5, 5), Error);
+}
+
+TEST(AlphaMap, CountsFacetsOfEveryPartOfALargeMesh) {
+    // Ever so many level facets, and behind them one at 60.05° just over the ground.
+    Mesh mesh;
+    const auto back = static_cast<float>(0.05 / std::tan(60.05 * kDegree));
+    mesh.vertices = {{0, 0, 5}, {1, 0, 5}, {0, 1, 5}, {0, 0, 0}, {1, 0, 0}, {0, back, 0.05F}};
+    mesh.facets.assign(100'000, Index3{0, 1, 2});
+    mesh.facets.push_back({3, 4, 5});
+    Context context;
+    const AlphaMap map = alpha_map(context, mesh.view(), 0, 10);
+    ASSERT_EQ(map.slopes[0].size(), 1u);
+    EXPECT_NEAR(map.slopes[0][0], 60 * kDegree, 1e-9);
+    EXPECT_EQ(std::count_if(map.slopes.begin(), map.slopes.end(), [](const auto& s) { return !s.empty(); }),
+              1);
+    EXPECT_NEAR(map.area, 0.5 * 0.05 / std::sin(60.05 * kDegree), 1e-6);
 }

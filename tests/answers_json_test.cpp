@@ -1,4 +1,4 @@
-// What the command answers in JSON, key by key: errors, ways out of an undercut.
+// What the command answers in JSON, key by key: errors, ways out of an undercut, verdicts.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -6,6 +6,7 @@
 
 #include "io/slabwright.h"
 #include "io/ways_out.h"
+#include "io/write/verify_json.h"
 #include "kernels/errors.h"
 
 namespace slabwright {
@@ -61,6 +62,29 @@ TEST(AnswersJson, WaysOutTellWhatEachLeaves) {
              "pockets": 1, "largest": [{"layer": 2, "volume": 499, "height": 5.5, "where": [1, 2, 30]}]},
           "milled_on_both_sides": {"layers": 1, "tops": [36], "volume": 0, "volume_error": 0, "height": 0,
              "pockets": 0, "largest": []}}]})"));
+}
+
+TEST(AnswersJson, AVerdictHasEachProgramsFigures) {
+    SimulationInput input;
+    Program& program = input.programs.emplace_back();
+    program.file = "L02_03_rough_T2.ngc";
+    program.layer = 1;
+    program.kind = OperationKind::rough;
+    program.tool = 2;
+    SimulationReport report;
+    ProgramFindings& found = report.programs.emplace_back();
+    found.gouge.cutter.depth = 0.0123456, found.gouge.cutter.line = 77;
+    found.gouge.shank.depth = 0.5, found.gouge.holder.depth = 1.25;
+    found.rapid.size = 0.00016;
+    found.removed_mm3 = 1234.56;
+    found.lowest = 17.12346;
+    found.cutting_mm = 100.26, found.rapid_mm = 49.94, found.seconds = 90.072;
+    const json told = json::parse(verify_json(input, report, {}, "part.stl", true));
+    EXPECT_EQ(told.at("programs"),
+              json::parse(R"([{"file": "nc/L02_03_rough_T2.ngc", "layer": 2, "kind": "rough",
+        "tool": 2, "gouge_mm": 0.01235, "gouge_line": 77, "shank_in_part_mm": 0.5, "holder_in_part_mm": 1.25,
+        "rapid_takes_mm": 0.0002, "removed_mm3": 1234.6, "lowest_z": 17.1235, "cutting_mm": 100.3,
+        "rapid_mm": 49.9, "minutes": 1.501}])"));
 }
 
 }  // namespace

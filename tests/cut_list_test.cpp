@@ -286,6 +286,25 @@ TEST(CutList, TakesEverySlabAndTheBoard) {
     EXPECT_EQ(loops, drawn);
 }
 
+TEST(CutList, HolesAreDrawnInTheLowestSlabsOfTheirLayers) {
+    // The second slab lies turned: its front edge is the right one there.
+    CutList list;
+    list.blanks = {{2, 1, 19, {200, 150}}, {3, 1, 19, {80, 50}}, {3, 2, 19, {80, 50}}};
+    list.boards = {{19, {600, 400}, {{{0, {10, 20, 200, 150}}, {1, {300, 5, 50, 80}, true}}, {}, {}}},
+                   {19, {600, 400}, {{{2, {0, 0, 80, 50}}}, {}, {}}}};
+    const std::string dxf =
+        cut_list_dxf(list, {{2, 1, 30.5, 40, 8, 12}, {3, 1, 20, 12, 6, 9}, {4, 1, 5, 5, 8, 12}});
+    EXPECT_NE(dxf.find("CIRCLE\n8\nDOWELS\n10\n40.5\n20\n60.0\n30\n0.0\n40\n4.0\n"
+                       "0\nTEXT\n8\nLABEL\n10\n48.5\n20\n60.0\n30\n0.0\n40\n4.0\n1\nD8 x 12 deep\n"),
+              std::string::npos)
+        << dxf;
+    EXPECT_NE(dxf.find("CIRCLE\n8\nDOWELS\n10\n338.0\n20\n25.0\n30\n0.0\n40\n3.0\n"), std::string::npos)
+        << dxf;
+    std::size_t circles = 0;
+    for (std::size_t at = 0; (at = dxf.find("CIRCLE", at)) != std::string::npos; ++at) ++circles;
+    EXPECT_EQ(circles, 2U);
+}
+
 TEST(CutList, TheProofFollowsItAtTheSaw) {
     Job job;
     job.slabs.length = 1500;

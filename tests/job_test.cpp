@@ -2,6 +2,8 @@
 // was meant.
 #include "engine/job.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -74,6 +76,31 @@ struct Scramble {
     }
 };
 
+/// The values of all keys, a line each.
+struct Values {
+    std::string text;
+    void table(const char*, const char*) {}
+    void required() {}
+    template <class Value>
+    void key(const char* name, Value& value, const char*) {
+        text += fmt::format("{} = {}\n", name, value);
+    }
+    void degrees(const char* name, double& value, const char*) {
+        text += fmt::format("{} = {:.9f}\n", name, value);
+    }
+    template <class Enum, std::size_t N>
+    void word(const char* name, Enum& value, const Word<Enum> (&)[N], const char*) {
+        text += fmt::format("{} = {}\n", name, static_cast<int>(value));
+    }
+};
+
+std::string values_of(Job job) {
+    Values values;
+    visit_job_keys(job, values);
+    for (Tool& tool : job.tools) visit_tool_keys(tool, values);
+    return values.text;
+}
+
 }  // namespace
 
 TEST(Job, DefaultsAreValidAndRoundTrip) {
@@ -111,6 +138,7 @@ TEST(Job, EveryKeyRoundTrips) {
     EXPECT_NE(text, job_toml(Job{}));
     const Job read = parse_job(text, "scrambled");
     EXPECT_EQ(job_toml(read), text);
+    EXPECT_EQ(values_of(read), values_of(job));
     EXPECT_EQ(read.machine.name, job.machine.name);
     EXPECT_EQ(read.slabs.thicknesses, job.slabs.thicknesses);
     EXPECT_EQ(read.layers.strategy, LayerStrategy::combined);

@@ -15,6 +15,7 @@
 
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
+#include "kernels/repair/bodies.h"
 #include "kernels/repair/rebuild.h"
 #include "kernels/repair/soup.h"
 #include "kernels/repair/triangulate.h"
@@ -391,6 +392,32 @@ TEST(Repair, ASoupIsRebuiltAsASolidOrAsNothing) {
         solids += result.solid ? 1 : 0;
     }
     std::printf("%d of 20 soups became solids\n", solids);
+}
+
+TEST(Repair, BodiesThatEncloseNothingAreTheirTwoFaces) {
+    FacetSoup soup;
+    std::vector<std::uint32_t> body_of;
+    const auto add = [&](float x, float side, const std::vector<Index3>& facets) {
+        const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+        for (const Vec3f& v : {Vec3f{x, 0, 0}, {x + side, 0, 0}, {x, side, 0}, {x, 0, side}})
+            soup.vertices.push_back(v);
+        const std::uint32_t number = body_of.empty() ? 0 : body_of.back() + 1;
+        for (const Index3& f : facets) {
+            soup.facets.push_back({first + f[0], first + f[1], first + f[2]});
+            body_of.push_back(number);
+        }
+    };
+    const std::vector<Index3> faces{{0, 1, 2}, {0, 2, 1}};
+    add(0, 1, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}});
+    add(10, 1, faces);
+    add(20, 2, faces);
+    add(30, 1.5F, faces);
+    const EmptyBodies found = find_empty_bodies(soup, body_of);
+    EXPECT_EQ(found.count, 3u);
+    EXPECT_NEAR(found.area_mm2, 2 * 2, 1e-12) << "both faces of the largest";
+    EXPECT_EQ(found.where, (Xyz{20, 0, 0}));
+    EXPECT_EQ(found.facets,
+              (std::vector<bool>{false, false, false, false, true, true, true, true, true, true}));
 }
 
 TEST(Repair, EdgesAreSortedInTwiceTheirMemory) {

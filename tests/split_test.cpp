@@ -156,6 +156,14 @@ TEST(Split, RefusesWhatItCannotCut) {
         }
     }
     EXPECT_TRUE(split_solid(context, block.view(), report, {.offset_mm = 5}).dowels.empty());
+    // Holes of 10.1 mm with 4 mm of wood around them need 18.1.
+    const auto dowels = [&](float width) {
+        const Mesh bar = weld(context, shapes::box({0, 0, 0}, {100, width, 60}));
+        return split_solid(context, bar.view(), report_mesh(context, bar.view()), {.offset_mm = 30})
+            .dowels.size();
+    };
+    EXPECT_EQ(dowels(18), 0u);
+    EXPECT_EQ(dowels(18.5F), 2u);
 }
 
 TEST(Split, ValveBodyIsItselfAgain) {
