@@ -332,6 +332,19 @@ TEST(BondCommand, WhatItCannotStudyItRefuses) {
 }
 
 // Words without an order are analysed, but no line is laid through them.
+TEST(BondStudy, TheTableOfVarianceIsThatByHand) {
+    // Means of 2 and 6 about 4: 16 between the glues, 4 within them at two degrees of freedom.
+    const BondTests tests = read_text("glue,y\nPU,1\nPVA,5\nPU,3\nPVA,7\n");
+    const std::string told = bond_text(tests, study_bonds(tests), {});
+    const std::size_t from = told.find("source"), to = told.find("\n\n", from);
+    EXPECT_EQ(told.substr(from, to - from + 1),
+              "source  df  seq SS  adj SS  adj MS     F      p\n"
+              "A        1      16      16      16  8.00  0.106\n"
+              "error    2       4       4       2\n"
+              "total    3      20\n"
+              "S 1.414  R2 80.00 %  adjusted 70.00 %\n");
+}
+
 TEST(BondStudy, WordsWithoutOrderHaveNoRegression) {
     const BondTests tests = read_text("glue,y\nPU,1\nPVA,2\nCA,4\nPU,1.5\nPVA,2.2\nCA,4.4\n");
     const BondStudy study = study_bonds(tests);

@@ -252,6 +252,8 @@ TEST(Parallel, PartsOfAPhaseTellAllTheirStepsOnce) {
     std::vector<double> fractions;
     Context context({.threads = 2,
                      .progress = [&](const Progress& progress) { fractions.push_back(progress.fraction); }});
+    context.advance(7);
+    EXPECT_TRUE(fractions.empty()) << "no phase has begun";
     context.begin_phase("work", 0.0, 1.0, 300);
     {
         ProgressPart whole(context, 100), first(whole, 0, 0.4), second(whole, 0.4, 1);
