@@ -12,6 +12,7 @@
 
 #include "kernels/errors.h"
 #include "kernels/polygons/farthest.h"
+#include "kernels/polygons/hull.h"
 #include "kernels/polygons/loops.h"
 #include "kernels/polygons/runs_inside.h"
 
@@ -633,6 +634,33 @@ TEST(Polygons, RunsInsideAreWhatLiesInside) {
     add(square, rectangle(0, 0, 1000, 1000));
     for (const RunInside& run : runs_inside(square, square)) EXPECT_TRUE(run.closed);
     EXPECT_TRUE(runs_inside(square, Loops{}).empty());
+}
+
+TEST(Polygons, HullIsItsCornersOnceCounterClockwise) {
+    const std::vector<Point2> square{{0, 0}, {10, 0}, {10, 10}, {0, 10}};
+    EXPECT_EQ(convex_hull({{10, 10}, {5, 0}, {0, 10}, {4, 6}, {10, 0}, {0, 0}, {0, 5}, {10, 10}, {0, 0}}),
+              square);
+    const std::vector<Point2> line{{-3, 4}, {7, 4}}, one{{2, 1}};
+    EXPECT_EQ(convex_hull({{7, 4}, {0, 4}, {-3, 4}, {2, 4}}), line);
+    EXPECT_EQ(convex_hull({{2, 1}, {2, 1}}), one);
+    EXPECT_TRUE(convex_hull({}).empty());
+    // Of random points: those, in turn, with all others on their left.
+    std::mt19937 random(7);
+    for (int round = 0; round < 200; ++round) {
+        std::vector<Point2> points(3 + random() % 12);
+        for (Point2& p : points)
+            p = {static_cast<std::int32_t>(random() % 9), static_cast<std::int32_t>(random() % 9)};
+        const std::vector<Point2> hull = convex_hull(points);
+        if (hull.size() < 3) continue;
+        for (std::size_t i = 0; i < hull.size(); ++i) {
+            const Point2 a = hull[i], b = hull[(i + 1) % hull.size()];
+            for (const Point2 p : points) {
+                const int left = (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
+                EXPECT_TRUE(left > 0 || (left == 0 &&
+                                         (p == a || p == b || std::count(hull.begin(), hull.end(), p) == 0)));
+            }
+        }
+    }
 }
 
 }  // namespace
