@@ -115,6 +115,12 @@ TEST(CoreContact, WhatItScrapesIsNoMatter) {
     EXPECT_EQ(watched.area(), 0);
     watched.to(60, 60, kTop - 0.3);
     EXPECT_GT(watched.area(), 400) << "straight down on, it is one plunge";
+    // A quarter of a millimetre is the most.
+    Watched less(face_mill()), more(face_mill());
+    less.over(60, 60).to(60, 60, kTop - 0.249);
+    EXPECT_EQ(less.area(), 0);
+    more.over(60, 60).to(60, 60, kTop - 0.251);
+    EXPECT_GT(more.area(), 400);
 }
 
 TEST(CoreContact, ACutterThatPlungesHasNoCore) {

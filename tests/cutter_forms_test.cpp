@@ -196,6 +196,8 @@ TEST(CutterForms, AHolderInProfileIsCheckedAsItsCones) {
     EXPECT_EQ(report.cutter.depth, 0);
     EXPECT_NEAR(report.holder.depth, 2 * std::cos(std::atan2(10, 15)), 1e-3);
     EXPECT_EQ(report.holder.line, 2U);
+    EXPECT_EQ(report.contact_lines, std::vector<std::uint32_t>{2});
+    EXPECT_TRUE(report.gouge_lines.empty());
 }
 
 TEST(CutterForms, FollowWiderBallsIntoNarrowPlaces) {

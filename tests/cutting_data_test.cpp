@@ -65,6 +65,13 @@ TEST(CuttingData, AToolThatStatesNoFeedGetsThatOfTheChart) {
     EXPECT_NEAR(
         tool_of(kChart + tool_text(1, "flat", 6.35, "max_rpm = 12000.0\nflutes = 3\n") + kBall).max_feed,
         0.012 * 25.4 * 3 * 12000, 1e-6);
+    // As fast in pine and in foam, however fast tool and machine may turn: .005 and .004 in a tooth.
+    for (const auto& [chart, inches] : {std::pair{"pine", 0.005}, {"foam", 0.004}}) {
+        const Tool tool =
+            tool_of("[machine]\nmax_rpm = 30000.0\n[material]\nchart = \"" + std::string(chart) + "\"\n" +
+                    tool_text(1, "flat", 6.35, "max_rpm = 24000.0\n") + kBall);
+        EXPECT_NEAR(tool.max_feed, inches * 25.4 * 2 * 18000, 1e-6) << chart;
+    }
     // The machine's spindle is no faster than it is.
     EXPECT_NEAR(
         tool_of(kChart + "[machine]\nmax_rpm = 10000.0\n" + tool_text(1, "flat", 6.35) + kBall).max_feed,

@@ -95,6 +95,8 @@ TEST(EdgesOperation, AConeRunsAlongConcaveEdges) {
     const Plan made = plan(context, stl, job);
     const std::vector<const Operation*> edges = edge_operations(made);
     EXPECT_TRUE(std::any_of(edges.begin(), edges.end(), [](const Operation* op) { return op->tool == 7; }));
+    // The finishing ball touches a ridge as well as the tapered one does, which has to be changed for.
+    EXPECT_TRUE(std::any_of(edges.begin(), edges.end(), [](const Operation* op) { return op->tool == 3; }));
     std::vector<test::EdgeProbe> probes = test::edge_probes(context, mesh.view(), 30);
     std::erase_if(probes,
                   [](const test::EdgeProbe& p) { return std::max(std::abs(p.x), std::abs(p.y)) > 38; });

@@ -234,6 +234,21 @@ TEST(Feeds, ThinChipsAndAirGoFasterAndThickOnesDoNot) {
         EXPECT_LE(op.wall_error_mm, bending_limit(op, plan.job));
 }
 
+// Between rapids, a way too short to go faster keeps the feeds that were planned, each of its own.
+TEST(Feeds, AShortWayBetweenRapidsGoesAsPlanned) {
+    Plan plan = plate();
+    Context context;
+    std::vector<Diagnostic> diagnostics;
+    plan.layers[0].operations = {line(plan, OperationKind::finish, 2,
+                                      {at(-60, 40, 30, 0), at(-60, 40, 15, 0), at(-52, 40, 15, 3000),
+                                       at(-44, 40, 15, 9000), at(-44, 40, 30, 0)})};
+    rate_layer(context, plan.layers[0], plan, diagnostics);
+    const std::vector<Move>& moves = plan.layers[0].operations[0].moves;
+    ASSERT_EQ(moves.size(), 5U);
+    EXPECT_EQ(moves[2].feed, 3000U);
+    EXPECT_EQ(moves[3].feed, 9000U);
+}
+
 // Over random programs: no feed over tool and machine, few different ones, rapids and plunges as they were,
 // the limit kept wherever the feed is above the floor, and the same bytes on any number of threads.
 TEST(Feeds, RandomPrograms) {

@@ -447,6 +447,18 @@ TEST(Job, RoughBlendStaysWithinTheAllowances) {
     EXPECT_FALSE(is_valid([](Job& j) { j.cutting.rough_blend = 0.01; }));
 }
 
+// Of the end mills the widest must pass between flask and pattern, with its allowance and 2.5 mm for leads.
+TEST(Job, AFlaskLeavesRoomForTheWidestEndMill) {
+    Job job;
+    job.cutting.wall_allowance = 0.5;
+    job.tools = {tool_of_kind(job, ToolKind::face), tool_of_kind(job, ToolKind::flat),
+                 tool_of_kind(job, ToolKind::ball)};
+    job.tools[1].diameter = 16;
+    EXPECT_EQ(least_flask_gap(job), 19);
+    job.tools[1].diameter = 0.5, job.tools[2].diameter = 0.75;
+    EXPECT_EQ(least_flask_gap(job), 3.75);
+}
+
 TEST(Job, ToolOfKind) {
     Job job;
     EXPECT_EQ(tool_of_kind(job, ToolKind::face).number, 1);

@@ -499,6 +499,8 @@ TEST(Footings, AnOverhangIsWeighedAgainstTheGlue) {
 TEST(Footings, TheFirstSlabIsGluedAllOverTheBoardWhereItsFootIsSmall) {
     const Stack small({square(90, 90, 12)});
     EXPECT_NE(small.note("joint.board"), nullptr);
+    EXPECT_EQ(small.refused(), 0U);
+    EXPECT_EQ(small.note("joint.overhang"), nullptr) << "glued so, it holds";
     EXPECT_NEAR(small.plan.layers[0].joints[0].area_mm2, 200 * 200, 1);
     EXPECT_NEAR(small.plan.layers[0].joints[0].standing_mm2, 12 * 12, 0.1);
     const Stack large({square(50, 50, 100)});

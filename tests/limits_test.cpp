@@ -6,6 +6,7 @@
 
 #include "engine/forces/bent_cutter.h"
 #include "engine/forces/cuts.h"
+#include "engine/forces/deep_runs.h"
 #include "engine/forces/feeds.h"
 #include "engine/forces/op_forces.h"
 #include "tests/support/plate.h"
@@ -137,6 +138,35 @@ TEST(Limits, NominalCutsSlowDownToo) {
     plan.job.machine.spindle_torque_nm = 1e-6;
     EXPECT_TRUE(slow_down(op, flat, plan.job));
     EXPECT_GE(op.moves[2].feed, 300U);
+}
+
+// Passes divide the deepest of a run's cuts, wherever in it that is; where its cuts are divided in two ways,
+// the hardest says how.
+TEST(DeepRuns, AreAsDeepAsTheDeepestOfTheirCuts) {
+    Operation op;
+    op.moves = {at(0, 0, 30, 0), at(10, 0, 10, 3000), at(20, 0, 10, 3000)};
+    const auto runs_of = [&](ToolKind kind, float first_depth, float second_depth, double first_load) {
+        Tool tool = plate().job.tools[1];
+        tool.kind = kind, tool.diameter = 8;
+        std::vector<SeenStretch> seen(2);
+        for (std::uint32_t k = 0; k < 2; ++k) {
+            seen[k].first = seen[k].last = k + 1;
+            seen[k].cuts = true;
+            seen[k].length = 10;
+            seen[k].feed = 3000;
+        }
+        seen[0].depth = first_depth, seen[1].depth = second_depth;
+        const PassQuestions ask{
+            [&](const SeenStretch& s, int) { return CutLoad{.cutter = s.first == 1 ? first_load : 2}; },
+            [](const SeenStretch&, int) { return 1.0; }};
+        return deep_runs(seen, op, tool, 1, ask);
+    };
+    EXPECT_EQ(runs_of(ToolKind::flat, 4, 6, 3), (std::vector<DeepRun>{{1, 2, 6, 4, PassShares::equal}}));
+    EXPECT_EQ(runs_of(ToolKind::flat, 6, 4, 1.5), (std::vector<DeepRun>{{1, 2, 6, 3, PassShares::equal}}));
+    // A ball cuts with its side from 6 mm on, and below that leaves a shell of .35 in the second round.
+    EXPECT_EQ(runs_of(ToolKind::ball, 4, 7, 3),
+              (std::vector<DeepRun>{{1, 2, 4 * 0.35, 4, PassShares::growing}}));
+    EXPECT_EQ(runs_of(ToolKind::ball, 4, 7, 1.5), (std::vector<DeepRun>{{1, 2, 7, 3, PassShares::equal}}));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "engine/moves/motion_time.h"
 #include "engine/paths/runs/layer_cut.h"
 #include "engine/paths/runs/leads.h"
+#include "engine/paths/runs/plan_view.h"
 #include "engine/paths/runs/rings.h"
 #include "tests/support/height_field.h"
 #include "tests/support/seed.h"
@@ -122,6 +123,36 @@ TEST(Rings, KeepTheirStep) {
         for (std::size_t k = 2; k < rings.size(); ++k)
             for (const PathPoint& p : rings[k]) EXPECT_LE(away(p, rings[k - 1]), most) << "ring " << k;
     }
+}
+
+// What is of use ends where the machine's travel does: no ring goes along there.
+TEST(Rings, DoNotGoAlongTheEndOfTheTravel) {
+    for (const bool along_x : {true, false}) {
+        Bench bench;
+        (along_x ? bench.job.machine.travel_x : bench.job.machine.travel_y) = 84;
+        const Loops forbidden = rectangle(-5, -5, 25, 25);
+        const RingPlan plan = plan_rings(bench.cut, bench.tool, forbidden, 5, kJunction, true);
+        ASSERT_FALSE(plan.pieces.empty());
+        for (const RingPlan::Piece& piece : plan.pieces)
+            for (std::size_t k = 1; k < piece.points.size(); ++k) {
+                const PathPoint &a = piece.points[k - 1], &b = piece.points[k];
+                const double u = to_mm(along_x ? a.x : a.y), v = to_mm(along_x ? b.x : b.y);
+                EXPECT_FALSE(std::min(u, v) > 51.9 || std::max(u, v) < -31.9) << u << " to " << v;
+            }
+    }
+}
+
+TEST(PlanView, NearALineIsWhatLiesWithinReachOfItsSegments) {
+    const std::vector<PathPoint> line{{0, 0, 0}, {300, 400, 0}, {300, 400, 0}, {300, 1000, 0}};
+    // 50 from the middle of the first segment, square to it: a fifth of (4, -3).
+    const PathPoint beside{190, 170, 0};
+    EXPECT_FALSE(near_line(beside, line, 50));
+    EXPECT_TRUE(near_line(beside, line, 50.01));
+    // Beyond the ends only these are near.
+    EXPECT_FALSE(near_line({-30, -40, 0}, line, 50));
+    EXPECT_TRUE(near_line({-30, -40, 0}, line, 50.01));
+    EXPECT_FALSE(near_line({300, 1050, 0}, line, 50));
+    EXPECT_TRUE(near_line({300, 1050, 0}, line, 50.01));
 }
 
 // Longer chords where the machine does not slow down for them: within the tolerance, fewer, and no slower.

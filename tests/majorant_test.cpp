@@ -152,6 +152,12 @@ TEST(Majorant, ConcaveArcIsCutOnceAndLeavesItsSagitta) {
     EXPECT_NEAR(left_over(profile, cuts), must, 2e-4);
 }
 
+TEST(Majorant, ThereAreAThousandCutsAtMost) {
+    // Every one of its edges would be a cut.
+    const Profile profile = sampled(10, 1002, [](double z) { return std::sqrt(400 - z * z); });
+    EXPECT_EQ(cuts_along(concave_majorant(profile), 1e-9).size(), 1000U);
+}
+
 TEST(Majorant, StraightWallIsCutOnce) {
     for (const double slope : {0.0, 0.7, -1.3}) {
         const auto cuts =

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -168,4 +169,18 @@ TEST(Travel, ChordsAreRunNoFasterThanTheirCircle) {
     }
     EXPECT_GT(seconds(1000), 1.05 * circle) << "50 of them are too short to stop on";
     EXPECT_GT(seconds(8), 1.3 * circle) << "they leave it by 0.46 mm";
+}
+
+// A level arc turns through both axes: the slower one is no faster on it than it is.
+TEST(Travel, AnArcIsRunNoFasterThanItsSlowerAxis) {
+    for (const std::size_t slow : {0U, 1U}) {
+        AxisLimits axes = alike(1000);
+        axes.speed[slow] = 50;
+        MotionLeg leg{1000, 200, {1, 0, 0}};
+        leg.leaving = {1, 0, 0};
+        leg.radius = 1000;
+        const double seconds = travel_seconds(std::array{leg}, axes);
+        EXPECT_GT(seconds, 1000 / 50.0) << slow;
+        EXPECT_LT(seconds, 1000 / 50.0 + 0.2) << slow << ": but for its ramps";
+    }
 }

@@ -156,5 +156,26 @@ TEST(Orientations, WhatTurningWouldChangeIsRefused) {
         }
 }
 
+// What is asked for the layers of a part that lies another way is what a plan asks.
+TEST(WaysOut, AskForLayersAsTheJobSays) {
+    Context context;
+    const Mesh mesh = weld(context, shapes::box({0, 0, 0}, {60, 40, 30}));
+    Job job;
+    for (const bool constrain : {false, true}) {
+        job.layers.saddles_constrain = constrain;
+        job.layers.min_layer = constrain ? 4 : 3;
+        job.layers.alpha = constrain ? 0.25 : 0.5;
+        job.slabs.facing_allowance = constrain ? 1 : 2;
+        job.material.min_thickness = constrain ? 7 : 0;
+        const LayerRequest request = quick_layer_request(context, mesh.view(), job);
+        EXPECT_EQ(request.height, 30);
+        EXPECT_EQ(request.saddles_constrain, constrain);
+        EXPECT_EQ(request.min_layer, job.layers.min_layer);
+        EXPECT_EQ(request.alpha, job.layers.alpha);
+        EXPECT_EQ(request.facing_allowance, job.slabs.facing_allowance);
+        EXPECT_NEAR(request.min_material, constrain ? 7 : 0.2 * 25.4, 1e-12);
+    }
+}
+
 }  // namespace
 }  // namespace slabwright

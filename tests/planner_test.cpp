@@ -8,6 +8,7 @@
 
 #include "engine/moves/path_builder.h"
 #include "engine/planner/planner.h"
+#include "engine/schedule/fit.h"
 #include "io/slabwright.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
@@ -50,6 +51,12 @@ TEST(Planner, SaysByHowMuchAPartIsTooLarge) {
                   .find("12.5 mm more than the slab's 1160.0 mm"),
               std::string::npos);
     EXPECT_NE(refusal(box(context, 100, 1161, 20), job, "fit.slab").find("1.0 mm more"), std::string::npos);
+    // As wide as the slab it is all of the stock.
+    Plan whole;
+    whole.job = job;
+    place_stock(whole, {{0, 0, 0}, {1160, 100, 20}});
+    EXPECT_EQ(whole.stock_min[0], 0);
+    EXPECT_EQ(whole.stock_max[0], 1160);
     EXPECT_NE(refusal(box(context, 100, 100, 1230), job, "fit.chamber")
                   .find("30.0 mm more than the build chamber's 1200.0 mm"),
               std::string::npos);

@@ -364,8 +364,9 @@ TEST(Probing, IsRefusedWhereNoCycleIsSure) {
               std::string::npos);
     EXPECT_NE(refusal("[machine]\nprobe = \"cycle\"\nmagazine = 12\n").find("no place in the magazine"),
               std::string::npos);
-    for (const char* key : {"fast_feed = 900.0", "slow_feed = 300.0", "search = 1.0", "retract = 0.5",
-                            "plate = -1.0", "reference = [1.0]"})
+    for (const char* key :
+         {"fast_feed = 900.0", "slow_feed = 300.0", "search = 1.0", "retract = 0.5", "plate = -1.0",
+          "reference = [1.0]", "tool = 0", "tool = 100000", "tip_diameter = 0.0"})
         EXPECT_TRUE(refusal(fmt::format("[machine]\ntable = \"fixed\"\nprobe = \"cycle\"\n[probing]\n{}{}\n",
                                         std::string_view(key).starts_with("reference")
                                             ? ""

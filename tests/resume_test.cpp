@@ -292,6 +292,7 @@ TEST(FaceOffProof, EachFaultIsToldAsWhatItIs) {
     const Remake made = remake_layer(
         context, {build.plan, build.sequence, build.sequence, state_after(build, k), 3, "resume_001/nc/"});
     ASSERT_EQ(made.layers.size(), 1U);
+    EXPECT_EQ(made.plan.layers[2].operations.back().file, "F001_L003_face_off_T1.ngc");
     const Program good = read_face_off(made, 0, "F001.ngc");
     const BlockToFaceOff whole = block_of(made, 0);
     const Tool& tool = made.plan.job.tools[0];

@@ -87,7 +87,8 @@ TEST(Seams, ARastersLinesEndAtABoss) {
     for (const Layer& layer : made.layers)
         for (const Operation& op : layer.operations)
             if (op.purpose == "projected raster") raster += op.cutting_mm;
-    ASSERT_GT(raster, 500);
+    EXPECT_GT(raster, 2000);
+    EXPECT_LT(raster, 3000) << "even ground needs no lines in between";
     write(context, made, folder / "out");
     const Verification found =
         verify_folder(context, folder / "out", {.source = stl, .cell = 0.5, .write = false});

@@ -342,6 +342,33 @@ TEST(SemiRough, ReachesWhatStandsFarFromAnyWall) {
     EXPECT_EQ(left(), 0);
 }
 
+// A wall that roughing kept off by less than the limit is as high as it was: it is taken step by step too.
+TEST(SemiRough, TakesAThinSheetBesideAWall) {
+    Waste w([](double x, double) { return x < 0 ? kTop : 4.0; },
+            [](Mesh& mesh) {  // the wall, half a millimetre thick at its foot, is made upright
+                for (Vec3f& v : mesh.vertices)
+                    if (v.x == 0) v.x = -0.49F;
+            });
+    w.job.cutting.wall_allowance = 0.8;
+    LayerStock stock(w.cut.context, w.cut.layer, w.cut.solid, 0.2);
+    stock.cut(w.cut.context, rough_layer(w.cut).back(), w.layer.tools.rough);
+    const CellGrid& grid = stock.grid();
+    const auto stands = [&] {  // cells of the sheet
+        std::size_t count = 0;
+        for (int j = 0; j < grid.ny; ++j)
+            for (int i = 0; i < grid.nx; ++i)
+                if (std::abs(grid.y(j)) < 12 && grid.x(i) > -0.45 && grid.x(i) < 1)
+                    count += stock.left(grid.index(i, j)) > kLimit;
+        return count;
+    };
+    EXPECT_GT(stands(), 100U);
+    Tool flat = w.layer.tools.finish;
+    flat.kind = ToolKind::flat;
+    const Operation op = cut_rest(w.cut, stock, flat, {OperationKind::semi_rough, "waste", kLimit, true});
+    EXPECT_FALSE(op.moves.empty());
+    EXPECT_EQ(stands(), 0U);
+}
+
 TEST(SemiRough, TheAllowanceIsAThirdOfRoughings) {
     Job job;
     Tool tool = tool_of_kind(job, ToolKind::ball);

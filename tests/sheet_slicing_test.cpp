@@ -140,6 +140,13 @@ TEST(SheetSlicing, GreedyFittingLeavesWhatTheProgramCovers) {
     EXPECT_EQ(counts(stack, 3), (std::vector<int>{3, 1, 0}));
 }
 
+// However small an outline is, it is told from others by what it overlaps.
+TEST(SheetSlicing, AThinPinTakesTheThickestSheets) {
+    Context context;
+    const Mesh pin = loft(context, {circle(0, 0.4, 48), circle(0.2 * kIn, 0.4, 48)});
+    EXPECT_EQ(counts(stack_of_sheets(context, pin.view(), print_rules()), 3), (std::vector<int>{0, 0, 1}));
+}
+
 TEST(SheetSlicing, BondLiesBetweenSheets) {
     Context context;
     const Mesh mesh = turned(context, 4 * 6 + 3 * 0.2, 1, 24, [](double) { return 20.0; });

@@ -388,6 +388,13 @@ TEST(Simulate, WhatNoToolReachesIsExcusedAndTheRestIsNot) {
     r = wide.run();
     EXPECT_NE(find(r, "left.too_much"), nullptr) << codes(r);
     EXPECT_NEAR(r.layers[0].missed_left.size, 3.5, 0.3);
+    for (const char* code : {"left.too_much", "left.missed"}) {
+        const Violation* left = find(r, code);
+        ASSERT_NE(left, nullptr) << codes(r);
+        EXPECT_EQ(left->file, "") << "what is left is of the layer, and of no program's line";
+        EXPECT_EQ(left->line, 0U);
+        EXPECT_EQ(left->layer, 0U);
+    }
     // ... unless the holder does not fit: too short a tool under a wide holder.
     for (Tool& t : wide.input.tools) t.stickout = 0.5, t.holder_diameter = 60;
     wide.input.tools[0].stickout = wide.input.tools[1].stickout = 50;
@@ -655,6 +662,12 @@ TEST(Simulate, SlabsThatCannotHoldThePart) {
     const SimulationReport r = thin.run();
     EXPECT_NE(find(r, "stack.thin"), nullptr);
     EXPECT_NE(find(r, "gouge.stock"), nullptr);
+    Block apart(true);
+    apart.input.layers[1].z_bottom = 10.5;
+    const SimulationReport gap = apart.run();
+    ASSERT_NE(find(gap, "stack.gap"), nullptr) << codes(gap);
+    EXPECT_EQ(find(gap, "stack.gap")->message,
+              "layer 2 begins at z 10.5000, where the one below ends at 10.0000");
 }
 
 TEST(Simulate, TimeInClosedForm) {

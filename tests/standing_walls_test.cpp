@@ -160,5 +160,32 @@ TEST(StandingWalls, ToldWhereTheyBreakThroughTheLayersBelow) {
     EXPECT_EQ(told(1, 10, true).size(), 1U) << "a ridge is thin, but not tall";
 }
 
+// A wall that hangs over its slab stands on nothing of the layer below, whatever thin part that has
+// elsewhere.
+TEST(StandingWalls, AreNotFollowedToWhatStandsElsewhere) {
+    Plan plan;
+    const Loops block = rectangle(60, 60, 0), low = unite(block, rectangle(40, 1, 0, 0, -60)),
+                high = unite(block, rectangle(40, 1, 0, 0, 60));
+    std::vector<std::vector<JointWood>> wood(2);
+    for (std::size_t l = 0; l < 2; ++l) {
+        Layer& layer = plan.layers.emplace_back();
+        layer.z_bottom = 15.0 * static_cast<double>(l);
+        layer.z_top = layer.z_bottom + 15;
+        JointWood& joint = wood[l].emplace_back();
+        joint.z = layer.z_bottom;
+        joint.above = l == 0 ? low : high;
+        joint.below = l == 0 ? block : low;
+        joint.both = block;
+        for (Loops& higher : joint.higher) higher = joint.above;
+    }
+    Context context;
+    const std::vector<std::vector<StandingFoot>> feet = standing_feet(context, plan, wood);
+    ASSERT_EQ(feet.size(), 2U);
+    for (std::size_t l = 0; l < 2; ++l) {
+        EXPECT_FALSE(feet[l].empty());
+        for (const StandingFoot& foot : feet[l]) EXPECT_NEAR(foot.middle[1], l == 0 ? -60 : 60, 0.1) << l;
+    }
+}
+
 }  // namespace
 }  // namespace slabwright

@@ -515,6 +515,20 @@ TEST(UndersideTarget, WhatComesLooseIsHeldByStrips) {
     EXPECT_FALSE(has_strips(slab));
 }
 
+// Two pieces of successive sections hold together where 20 mm² of them lie on each other.
+TEST(UndersideTarget, PiecesHoldByTwentySquareMillimetres) {
+    Context context;
+    const TurnedSlab slab = slab_of_block();
+    const auto hold = [&](float mm2) {
+        // A plate whose corner lies on that of the rim below it, 5 mm wide there.
+        shapes::Facets facets = shapes::box({0, 0, 0}, {50, 50, 10});
+        shapes::append(facets, shapes::box({50 - mm2 / 5, 45, 10}, {90, 90, 20}));
+        return hangs_together(context, weld(context, facets), slab);
+    };
+    EXPECT_TRUE(hold(20.5F));
+    EXPECT_FALSE(hold(19.5F));
+}
+
 TEST(UndersideTarget, WhatLiesInItsWebStaysUnmade) {
     Context context;
     // Under a roof that is 1 mm thick: of 17 mm of air 2 lie in the web.

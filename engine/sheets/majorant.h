@@ -30,8 +30,8 @@ struct StraightCut {
 [[nodiscard]] StraightCut supporting_cut(std::span<const ProfilePoint> majorant, double z, double most_slope);
 
 /// The fewest cuts that leave at most `leave` mm (square to the majorant) over it, none below it; of so many,
-/// those that leave least. From bottom to top. Along an arc of radius ρ that turns by Δφ they are
-/// ⌈Δφ / (2 acos(ρ / (ρ + leave)))⌉.
+/// those that leave least; a thousand at most. From bottom to top. Along an arc of radius ρ that turns by Δφ
+/// they are ⌈Δφ / (2 acos(ρ / (ρ + leave)))⌉.
 /// @param leave over 0
 [[nodiscard]] std::vector<StraightCut> cuts_along(std::span<const ProfilePoint> majorant, double leave);
 
