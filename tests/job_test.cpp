@@ -12,6 +12,7 @@
 #include <numbers>
 #include <random>
 
+#include "engine/base_board.h"
 #include "io/read/job_toml.h"
 #include "io/text/job_keys.h"
 #include "io/write/job_toml.h"
@@ -457,6 +458,19 @@ TEST(Job, AFlaskLeavesRoomForTheWidestEndMill) {
     EXPECT_EQ(least_flask_gap(job), 19);
     job.tools[1].diameter = 0.5, job.tools[2].diameter = 0.75;
     EXPECT_EQ(least_flask_gap(job), 3.75);
+}
+
+// Unless it is stated, the base board is cut as deep as the largest ball reaches below the pattern.
+TEST(Job, TheBaseBoardIsCutByBalls) {
+    Job job;
+    job.tools = {tool_of_kind(job, ToolKind::face), tool_of_kind(job, ToolKind::ball)};
+    job.tools[1].diameter = 8;
+    EXPECT_EQ(board_cut_limit(job.machine, job.tools), 4);
+    job.machine.base_board_cut = 1.5;
+    EXPECT_EQ(board_cut_limit(job.machine, job.tools), 1.5);
+    job.machine.base_board_cut = -1;
+    job.tools[1].diameter = 60;
+    EXPECT_EQ(board_cut_limit(job.machine, job.tools), job.machine.base_board_thickness);
 }
 
 TEST(Job, ToolOfKind) {

@@ -283,6 +283,14 @@ TEST(SheetCost, WaysStandSideBySide) {
     for (const double r : {50.0, 48.0, 46.0, 44.0, 44 - 14 / 3.0, 44 - 28 / 3.0})
         area += 32 * r * r * std::sin(2 * 3.141592653589793 / 64);
     EXPECT_NEAR(costs[0].part_kg, area * 6 * 7850e-9, 1e-4 * costs[0].part_kg);
+    // A sheet of 1000 mm³ at 8000 kg/m³ is 8 g, and no more; nothing weighs nothing.
+    SheetsPlan small;
+    EXPECT_EQ(cost_of(small, "none", 8000, {}).part_kg, 0);
+    small.pieces.emplace_back();
+    small.pieces[0].area_mm2 = 500;
+    small.pieces[0].span = {0, 2, 0};
+    EXPECT_NEAR(cost_of(small, "small", 8000, {}).part_kg, 0.008, 1e-12);
+    EXPECT_EQ(cost_of(small, "small", 8000, {}).stock_kg, 0);
     EXPECT_EQ(sheet_material("cheese"), nullptr);
     EXPECT_NEAR(sheet_bond("braze")->strength_mpa, 32.04, 0.01);
 }

@@ -320,6 +320,21 @@ TEST(Simulate, ARidgeThatWasLeftIsADeepCut) {
     EXPECT_NEAR(find(r, "cut.too_deep")->size, 5, 1e-6);
 }
 
+// Where a tool has come to from an unknown place, what stood there is taken by the way that begins there.
+TEST(Simulate, AWayFromAnUnknownPlaceTakesWhatStandsWhereItBegins) {
+    for (const double stepdown : {0.0, 1.0}) {
+        Block block;
+        Writer first("L1_02", 0, 2, OperationKind::rough);
+        first.to(kUnknown, kUnknown, 5).to(-5, -5, 5).to(15, -5, 5, 1000).to(15, -5, kClear);
+        block.rough() = first.p;
+        block.rough().planned_stepdown = stepdown;
+        const SimulationReport r = block.run();
+        ASSERT_EQ(r.programs.size(), 2U);
+        EXPECT_NEAR(r.programs[1].removed_mm3, 5 * (20 * 10 + std::numbers::pi * 5 * 5), 5) << stepdown;
+        EXPECT_EQ(find(r, "cut.too_deep") != nullptr, stepdown > 0) << codes(r);
+    }
+}
+
 TEST(Simulate, EmptyOperationTravelAndUnknownStart) {
     Block twice;
     twice.input.programs.insert(twice.input.programs.begin() + 1, twice.input.programs[0]);

@@ -127,6 +127,23 @@ TEST(Standing, KnowsWhatWasCleared) {
     EXPECT_NEAR(standing.free_tip(flat, {32, 10}, {32, 30}), kTop, 1e-3);
 }
 
+// Straight down a cutter without edges at its middle leaves what stands under that; on a way it takes all
+// that its core does not cover all the time.
+TEST(Standing, UnderACoreItStaysAsItWas) {
+    const CutterShape flat = flat_cutter(10);
+    Standing down({0, 0}, {60, 60}, kTop);
+    down.cut(flat, {30, 30, 9}, {30, 30, 9}, 6);
+    EXPECT_NEAR(cell_bound(down, 30, 30), kTop, 1e-3);
+    EXPECT_NEAR(cell_bound(down, 34, 30), kTop, 1e-3);
+    for (const double angle : {0.0, 1.0, 2.0, 3.0, 4.0, 5.0})
+        EXPECT_NEAR(cell_bound(down, 30 + 8 * std::cos(angle), 30 + 8 * std::sin(angle)), 9, 1e-3) << angle;
+    Standing along({0, 0}, {60, 60}, kTop);
+    along.cut(flat, {26, 30, 9}, {34, 30, 9}, 6);
+    EXPECT_NEAR(cell_bound(along, 30, 30), kTop, 1e-3) << "4 mm from either end";
+    EXPECT_NEAR(cell_bound(along, 24, 30), 9, 1e-3) << "2 mm beyond the first";
+    EXPECT_NEAR(cell_bound(along, 36, 30), 9, 1e-3);
+}
+
 TEST(Standing, BallsAreBoundedByTheirShape) {
     // Where a ball went it may go again, lower by nothing and higher by anything; across it meets the cusp
     // between two passes.
