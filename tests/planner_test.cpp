@@ -14,6 +14,7 @@
 #include "kernels/mesh/weld.h"
 #include "kernels/stock/stock.h"
 #include "tests/data/models.h"
+#include "tests/mesh_shapes.h"
 #include "tests/support/files.h"
 #include "tests/support/height_field.h"
 #include "tests/support/loft.h"
@@ -347,6 +348,23 @@ TEST(Planner, ProgressIsToldAllTheWay) {
     EXPECT_DOUBLE_EQ(before, 1);
     EXPECT_GT(in_paths, 5 * result.layers.size());
     EXPECT_LT(widest, 0.2);
+}
+
+// A level step of 272 cm² is no more work than roughing four times as much away: its layer, which is planned
+// first, is told to be three quarters of it all, not nearly all.
+TEST(Planner, ProgressGoesByTheWorkOfALayer) {
+    std::vector<double> told;
+    Context context({.threads = 1, .progress = [&](const Progress& p) {
+                         if (p.phase == "paths") told.push_back(p.fraction);
+                     }});
+    shapes::Facets facets = shapes::box({0, 0, 0}, {200, 200, 9});
+    shapes::append(facets, shapes::box({20, 20, 0}, {100, 180, 36}));
+    const std::size_t layers = make_plan(context, weld(context, facets), {}, Job{}).layers.size();
+    ASSERT_GT(layers, 1U);
+    ASSERT_EQ(told.size() % layers, 1U) << "as often in each";
+    const double first = told.front(), last = told.back(),
+                 share = (told[told.size() / layers] - first) / (last - first);
+    EXPECT_NEAR(share, 0.77, 0.08);
 }
 
 // Read once for both, or for each: the same plan and the same findings.
