@@ -12,6 +12,7 @@
 #include "engine/paths/runs/leads.h"
 #include "engine/paths/runs/plan_view.h"
 #include "engine/paths/runs/rings.h"
+#include "engine/paths/runs/zigzag.h"
 #include "tests/support/height_field.h"
 #include "tests/support/seed.h"
 
@@ -289,6 +290,37 @@ TEST(Links, AHelixLeadsIntoStockOnTheFreeSideOnly) {
 }
 
 // A ball that keeps an allowance asks a wider one, whose tip lies lower by what it is wider.
+// Of a face mill that does not plunge nearly all is its middle, but nothing beyond its rim.
+TEST(Links, AFaceMillGoesStraightDownWhereItHasCut) {
+    Bench bench;
+    bench.tool = tool_of_kind(bench.job, ToolKind::face);
+    bench.tool.diameter = 20;
+    PathBuilder path = bench.builder();
+    const Point2 at{to_units(-15), to_units(-15)};
+    EXPECT_NEAR(path.standing_middle(at), kTop, 1e-3);
+    bench.standing.cut(flat_cutter(10), {-15, -15, 5}, {-15, -15, 5});
+    EXPECT_NEAR(path.standing_middle(at), 5, 1e-3);
+}
+
+// Two stretches of neighbouring lines that have one place in common are one way.
+TEST(Links, AZigzagGoesOnWhereStretchesMeetInOnePlace) {
+    Bench bench;
+    PathBuilder path = bench.builder();
+    const std::vector<std::int32_t> lines{to_units(-20), to_units(-15)};
+    zigzag(path, bench.cut, bench.tool, lines, {{{-10, 10}}, {{10, 30}}}, 14,
+           [](std::span<const std::int32_t> at) {
+               Fibres free;
+               free.starts.assign(at.size() + 1, 0);
+               return free;
+           });
+    EXPECT_TRUE(path.finish());
+    std::size_t first = 0, last = 0;
+    for (std::size_t k = 0; k < bench.operation.moves.size(); ++k)
+        if (bench.operation.moves[k].z == to_units(14)) last = k, first = first == 0 ? k : first;
+    ASSERT_GT(last, first);
+    EXPECT_NEAR(bench.highest(first, last), 14, 1e-9);
+}
+
 TEST(Links, ABallKeepsItsAllowanceOverWhatLiesFlat) {
     constexpr double kAllowance = 0.3;
     for (const double over : {0.2, 0.25, 0.35}) {
