@@ -6,6 +6,7 @@
 
 #include "io/slabwright.h"
 #include "io/ways_out.h"
+#include "io/write/sheets_json.h"
 #include "io/write/verify_json.h"
 #include "kernels/errors.h"
 
@@ -24,6 +25,20 @@ TEST(AnswersJson, AnErrorHasItsWordsAndThoseOfTheOthers) {
         "code": "stl.open", "message": "is open", "place": "part.stl", "remedy": "close it",
         "also": [{"code": "left.too_much", "message": "3 mm are left", "place": "L01.ngc:7",
                   "remedy": "give a tool"}]}})"));
+}
+
+TEST(AnswersJson, SheetsTellHowTheirModelWasPrepared) {
+    ReadingOptions reading;
+    const std::vector<SheetCost> costs;
+    const auto prepared = [&] {
+        return json::parse(
+                   sheets_json(SheetsPlan{}, InputInfo{}, reading, {costs, nullptr, nullptr, {}}))["input"]
+            .value("prepared", json());
+    };
+    EXPECT_EQ(prepared(), json());
+    reading.preparation.skin = {.mm = 0.75, .normal = std::array{0.0, 0.0, 1.0}, .angle_deg = 12};
+    EXPECT_EQ(prepared(), json::parse(R"({"matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]],
+        "skin": {"mm": 0.75, "angle_deg": 12, "normal": [0, 0, 1]}})"));
 }
 
 TEST(AnswersJson, WaysOutTellWhatEachLeaves) {

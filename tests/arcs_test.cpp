@@ -187,6 +187,21 @@ TEST(Arcs, ACircleBecomesThreeArcs) {
     EXPECT_EQ(moves[3].y, 0);
 }
 
+TEST(Arcs, WhereAChordWouldDoThereIsNone) {
+    // It rises by 1.5 and by 56 µm over its chord.
+    for (const auto& [length, arcs] : {std::pair{0.49, 0}, {3.0, 1}}) {
+        std::vector<Move> moves;
+        for (int k = 0; k <= 6; ++k) {
+            const double turn = length / 20 * (k / 6.0 - 0.5);
+            moves.push_back(
+                {to_units(20 * std::sin(turn)), to_units(20 * std::cos(turn)), 0, k == 0 ? 0U : 1000U});
+        }
+        fit_arcs(moves, {.tolerance = 18});
+        EXPECT_EQ(moves.size(), 2U) << length;
+        EXPECT_EQ(arcs_in(moves), arcs) << length;
+    }
+}
+
 TEST(Arcs, SwitchedOffOnlyChordsRemain) {
     std::mt19937 random(3);
     std::vector<Move> moves = random_path(random, 0, 0.0012);

@@ -381,6 +381,8 @@ TEST(EngineRefusals, MeshesThatAreNoSolids) {
     box.vertices[3].y = std::numeric_limits<float>::infinity();
     EXPECT_EQ(refusal([&] { const ClosestPoint closest(context, box.view()); }), "mesh.not_finite");
     EXPECT_EQ(refusal([&] { const AccessScene scene(context, box.view()); }), "mesh.not_finite");
+    std::swap(box.vertices[0], box.vertices[3]);
+    EXPECT_EQ(refusal([&] { const AccessScene scene(context, box.view()); }), "mesh.not_finite");
 
     const auto split = [&](const Mesh& mesh) {
         return refused_as([&] {
