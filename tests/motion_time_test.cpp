@@ -10,6 +10,7 @@
 #include <random>
 #include <vector>
 
+#include "engine/moves/feed_lengths.h"
 #include "tests/support/seed.h"
 
 using namespace slabwright;
@@ -172,6 +173,14 @@ TEST(Travel, ChordsAreRunNoFasterThanTheirCircle) {
 }
 
 // A level arc turns through both axes: the slower one is no faster on it than it is.
+TEST(FeedLength, OfAStraightMoveStandsInItsMiddle) {
+    const FeedLength way = straight_length(1200, {1, 2, 4}, {4, 2, 8});
+    EXPECT_EQ(way.feed, 1200);
+    EXPECT_DOUBLE_EQ(way.mm, 5);
+    for (const auto& [k, middle] : {std::pair{0, 2.5}, {1, 2.0}, {2, 6.0}})
+        EXPECT_DOUBLE_EQ(way.moment[static_cast<std::size_t>(k)], 5 * middle) << k;
+}
+
 TEST(Travel, AnArcIsRunNoFasterThanItsSlowerAxis) {
     for (const std::size_t slow : {0U, 1U}) {
         AxisLimits axes = alike(1000);

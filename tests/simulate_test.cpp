@@ -393,6 +393,7 @@ TEST(Simulate, WhatNoToolReachesIsExcusedAndTheRestIsNot) {
     EXPECT_EQ(codes(r), "") << r.layers[0].missed_left.where[0] << " " << r.layers[0].missed_left.where[1]
                             << " " << r.layers[0].missed_left.where[2];
     EXPECT_NEAR(static_cast<double>(r.layers[0].unreachable) * 0.0625, 80, 12);
+    EXPECT_DOUBLE_EQ(r.unreachable_mm2(), static_cast<double>(r.layers[0].unreachable) * 0.0625);
     EXPECT_NEAR(r.layers[0].unreachable_left.size, 2,
                 0.2);  // the middle of the slot is 2 mm from either wall
     // A slot of 7 mm lets the ball in: that it was left is the plan's fault.
