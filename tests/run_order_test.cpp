@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "engine/paths/operations/rest.h"
@@ -178,6 +181,38 @@ TEST(Chains, AFlatGoesToTheNextRunOnOneSlopeOrInOneHop) {
         });
     }
     EXPECT_GT(slopes, 20);
+    EXPECT_GT(hops, 20);
+}
+
+TEST(Chains, ABallGoesToTheNextRunOnTheSurfaceOrInOneHop) {
+    std::mt19937 random(test::seed());
+    const Hills hills([](double x, double y) { return 2 * waves(x, y) - 1; });
+    constexpr double chord = 0.2, radius = 1.5, cuts = chord * chord / (8 * radius);
+    const DropIndex part(hills.cut.solid, ball_cutter(radius));
+    const Slide slide{.part = &part, .chord = chord, .top = kTop, .hops = true};
+    std::uniform_real_distribution<double> at(-7, 7), by(-2, 2);
+    int along_surface = 0, hops = 0;
+    for (int round = 0; round < 300; ++round) {
+        std::vector<std::vector<PathPoint>> runs(2);
+        double x = at(random), y = at(random);
+        for (std::vector<PathPoint>& run : runs) {
+            run.push_back({to_units(x), to_units(y), to_units(part.drop(x, y).tip_z) + 1});
+            x += by(random), y += by(random);
+        }
+        const auto chains = chained(runs, slide);
+        ASSERT_EQ(chains.size(), 1U);
+        const std::vector<PathPoint>& way = chains[0];
+        int upright = 0;
+        for (std::size_t k = 1; k < way.size(); ++k)
+            upright += way[k - 1].x == way[k].x && way[k - 1].y == way[k].y;
+        EXPECT_LE(upright, 2);
+        EXPECT_TRUE(upright == 0 || way.size() <= 4) << way.size();
+        (upright > 0 ? hops : along_surface) += 1;
+        along(way, [&](double px, double py, double pz) {
+            ASSERT_GE(pz, part.drop(px, py).tip_z - cuts - 1e-3) << "round " << round;
+        });
+    }
+    EXPECT_GT(along_surface, 20);
     EXPECT_GT(hops, 20);
 }
 
