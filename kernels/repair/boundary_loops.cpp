@@ -66,10 +66,13 @@ std::vector<BoundaryLoop> boundary_loops(const FacetSoup& soup, std::span<const 
         const double back_length = length(back);
         std::size_t best = missing.size();
         double sharpest = -2;
-        for (const Missing& edge : std::ranges::equal_range(missing, v, {}, &Missing::from)) {
-            const auto i = static_cast<std::size_t>(&edge - missing.data());
+        const auto [first, last] =
+            std::equal_range(missing.begin(), missing.end(), Missing{v, 0, 0},
+                             [](const Missing& a, const Missing& b) { return a.from < b.from; });
+        for (auto edge = first; edge != last; ++edge) {
+            const auto i = static_cast<std::size_t>(edge - missing.begin());
             if (gone[i]) continue;
-            const Xyz ahead = minus(soup.at(edge.to), p);
+            const Xyz ahead = minus(soup.at(edge->to), p);
             const double lengths = length(ahead) * back_length;
             const double cosine = lengths > 0 ? inner(ahead, back) / lengths : 1;
             if (best == missing.size() || cosine > sharpest) best = i, sharpest = cosine;
