@@ -109,9 +109,10 @@ TEST(LevelOrder, NothingIsCutUnderWhatStillStandsBesideIt) {
         cut_levels(path, hills.cut, tool, part, levels, false);
         path.finish();
         std::vector<std::size_t> cut_at;
-        for (const auto& [level, run] : all) {
+        for (const auto& each : all) {
+            const PathPoint& start = each.second.front();
             const auto found = std::find_if(op.moves.begin(), op.moves.end(), [&](const Move& m) {
-                return m.x == run.front().x && m.y == run.front().y && m.z == run.front().z;
+                return m.x == start.x && m.y == start.y && m.z == start.z;
             });
             ASSERT_NE(found, op.moves.end());
             cut_at.push_back(static_cast<std::size_t>(found - op.moves.begin()));
