@@ -8,6 +8,7 @@
 #include <string>
 
 #include "engine/paths/operations/drilling.h"
+#include "engine/planner/drill_plan.h"
 #include "engine/tools/libraries.h"
 #include "io/slabwright.h"
 #include "io/write/stl_writer.h"
@@ -16,6 +17,7 @@
 #include "tests/support/files.h"
 #include "tests/support/places.h"
 #include "tests/support/schema.h"
+#include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -63,6 +65,61 @@ TEST(Boring, WhatBoresIsHalfAsWideAndClearOfItsCore) {
     EXPECT_FALSE(can_bore(tool, 6.05));
     tool.kind = ToolKind::ball;
     EXPECT_FALSE(can_bore(tool, 10));
+}
+
+TEST(Boring, EachHoleIsBoredByTheWidestToolThatCan) {
+    std::mt19937 random(test::seed());
+    const auto draw = [&](double a, double b) {
+        return std::uniform_real_distribution<double>(a, b)(random);
+    };
+    Context context;
+    const Mesh plate = plate_with_holes(context);
+    Plan plan;
+    plan.job.cutting.bore_holes = true;
+    for (const double bottom : {0.0, 18.0}) {
+        Layer& layer = plan.layers.emplace_back();
+        layer.z_bottom = bottom;
+        layer.z_top = bottom == 0 ? 18 : kTop;
+    }
+    std::size_t bored = 0, left = 0;
+    for (int round = 0; round < 60; ++round) {
+        plan.job.tools.clear();
+        for (int number = 1; number <= 1 + round % 6; ++number) {
+            Tool& tool = plan.job.tools.emplace_back();
+            tool.number = number;
+            tool.kind = random() % 6 == 0 ? ToolKind::ball : ToolKind::flat;
+            tool.diameter = tool.shank_diameter = draw(3, 18);
+            tool.flute_length = draw(10, 40);
+            tool.stickout = 100;
+            tool.plunges = random() % 2 == 0;
+        }
+        const DrillPlan found = plan_drilling(context, plate.view(), plan);
+        ASSERT_EQ(found.layers.size(), plan.layers.size());
+        for (const auto& [x, diameter, bottom] :
+             {std::array{25.0, kThrough, 0.0}, std::array{75.0, kBlind, kFloor}}) {
+            const Tool* widest = nullptr;
+            for (const Tool& tool : plan.job.tools) {
+                const bool reaches = tool.flute_length >= (bottom == 0 ? 18 : 12.0);
+                if (can_bore(tool, diameter) && reaches &&
+                    (widest == nullptr || tool.diameter > widest->diameter))
+                    widest = &tool;
+            }
+            for (std::size_t i = 0; i < plan.layers.size(); ++i) {
+                std::vector<DrilledHole> here;
+                for (const DrilledHole& hole : found.layers[i])
+                    if (std::abs(hole.x - x) < 1) here.push_back(hole);
+                ASSERT_EQ(here.size(), widest != nullptr ? 1U : 0U);
+                if (widest == nullptr) continue;
+                EXPECT_EQ(here[0].tool, widest->number);
+                EXPECT_NEAR(2 * here[0].around + widest->diameter, diameter, 0.01);
+                EXPECT_NEAR(here[0].top, plan.layers[i].z_top, 1e-4);
+                EXPECT_NEAR(here[0].tip, std::max(plan.layers[i].z_bottom, bottom), 1e-4);
+            }
+            ++(widest != nullptr ? bored : left);
+        }
+    }
+    EXPECT_GT(bored, 20U);
+    EXPECT_GT(left, 20U);
 }
 
 TEST(Boring, RoundHolesWithoutADrillAreBoredAndProven) {

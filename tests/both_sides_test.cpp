@@ -9,6 +9,7 @@
 #include <random>
 
 #include "engine/planner/milled_ways.h"
+#include "engine/planner/underside.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
 #include "tests/support/seed.h"
@@ -85,6 +86,34 @@ TEST(BothSides, LayersKeepToTheirThickness) {
     EXPECT_THROW((void)place_layers_both_sides(request(60, 0, 3), gaps), Error);
     // Only a layer under the least thickness is left here.
     EXPECT_EQ(tops_of(place_layers_both_sides(request(60, 2, 3), AirGaps{})).size(), 30U);
+}
+
+// Two slits that only boundaries 0.4 to 0.8 mm apart make.
+TEST(BothSides, ALayerIsAsThinAsTheJobLetsIt) {
+    Context context;
+    AirGaps lines;
+    lines.top = 60;
+    lines.grid = {0, 0, 1, 1, 200};
+    lines.rows.resize(1);
+    for (const auto& [low, high] : {std::pair{19.9, 20.1}, {20.5, 20.7}})
+        for (int k = 0; k < 100; ++k)
+            lines.rows[0].push_back({static_cast<std::uint32_t>(lines.rows[0].size()), 0, low, high, true});
+    Job job;
+    job.layers.sides = SlabSides::two;
+    job.tolerances.undercut = 0.05;
+    for (const double least : {0.0, 0.5, 0.9, 3.0}) {
+        const std::vector<double> tops =
+            tops_of(place_two_sided(context, job, request(60, 60, least), lines, {}));
+        const double left = unmade_air(context, lines, tops, MilledFrom::both_sides).volume_mm3;
+        if (least < 0.8) {
+            ASSERT_EQ(tops.size(), 3U) << least;
+            EXPECT_NEAR(tops[1] - tops[0], 0.6, 0.2 + kSameHeight);
+            EXPECT_LT(left, 1);
+        } else {
+            EXPECT_EQ(tops.size(), 2U) << least;
+            EXPECT_NEAR(left, 0.2 * 100, 0.1) << "one of them stays filled";
+        }
+    }
 }
 
 /// mm³ that stay, and a price for each layer.

@@ -388,6 +388,33 @@ TEST(CutList, NestedSlabsFillABoardToTheKerf) {
     EXPECT_EQ(alone[0].offcuts[1].mm2(), 200 * 295) << "above it, a kerf from the first";
 }
 
+// Five pieces around each other fill a board to the kerf, and no cut goes from edge to edge between them.
+TEST(CutList, NestedSlabsFillBoardsThatNoSawCanPart) {
+    std::mt19937 random(test::seed());
+    const auto mm = [&](double low, double high) {
+        return std::floor(std::uniform_real_distribution(low, high)(random));
+    };
+    std::size_t filled = 0;
+    for (int trial = 0; trial < 60; ++trial) {
+        const SawnSize board{mm(400, 1200), mm(400, 1000)};
+        const double kerf = mm(2, 9);
+        // Of the pieces at the left and at the bottom, and of those at the bottom and at the right.
+        const double left = mm(60, board.length / 2), low = mm(60, board.width / 2),
+                     long_low = mm(left + kerf + 50, board.length - kerf - 60),
+                     high_right = mm(low + kerf + 50, board.width - kerf - 60);
+        const std::vector<SawnSize> pieces{{long_low, low},
+                                           {board.length - long_low - kerf, high_right},
+                                           {board.length - left - kerf, board.width - high_right - kerf},
+                                           {left, board.width - low - kerf},
+                                           {long_low - left - kerf, high_right - low - kerf}};
+        EXPECT_GT(lay_on_boards(pieces, board, kerf).size(), 1U);
+        const std::vector<SawnBoard> boards = nest_on_boards(pieces, board, kerf);
+        check_nested(boards, pieces, board, kerf);
+        filled += boards.size() == 1;
+    }
+    EXPECT_GT(filled, 5U);
+}
+
 TEST(CutList, TheProofHoldsANestToItsKerf) {
     Job job;
     job.slabs.length = 1500;

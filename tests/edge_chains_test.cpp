@@ -5,13 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
 
+#include "io/write/edges_json.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
 #include "tests/mesh_shapes.h"
 #include "tests/support/drilled_plate.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
@@ -71,6 +74,32 @@ TEST(EdgeChains, ABlindHoleHasARimAndAFoot) {
     // The wall's chords turn by 7.5°: with them three meet at each corner of rim and foot.
     EXPECT_EQ(find_edge_chains(context, mesh.view(), 7).size(), 12U + 3 * 48U);
     EXPECT_EQ(find_edge_chains(context, mesh.view(), 91).size(), 0U);
+}
+
+TEST(EdgeChains, ASumCountsTheClosedOnesOfItsKind) {
+    std::mt19937 random(test::seed());
+    for (int round = 0; round < 40; ++round) {
+        std::vector<EdgeChain> chains(random() % 6);
+        std::array<std::size_t, 2> all{}, closed{};
+        std::array<double, 2> mm{};
+        for (EdgeChain& c : chains) {
+            c.convex = random() % 2 == 0;
+            c.closed = random() % 2 == 0;
+            c.vertices = {0, 1, 2};
+            c.length_mm = static_cast<double>(1 + random() % 100);
+            const std::size_t kind = c.convex ? 1 : 0;
+            ++all[kind], closed[kind] += c.closed ? 1 : 0, mm[kind] += c.length_mm;
+        }
+        JsonText text;
+        put_edges(text, chains, 30);
+        const nlohmann::json told = nlohmann::json::parse(text.take());
+        for (const std::size_t kind : {0U, 1U}) {
+            const nlohmann::json& sum = told.at(kind == 1 ? "convex" : "concave");
+            EXPECT_EQ(sum.at("chains"), all[kind]);
+            EXPECT_EQ(sum.at("closed"), closed[kind]);
+            EXPECT_EQ(sum.at("length"), mm[kind]);
+        }
+    }
 }
 
 TEST(EdgeChains, AChainEndsWhereTheKindChanges) {

@@ -17,6 +17,7 @@
 #include <set>
 
 #include "kernels/errors.h"
+#include "kernels/features/filled_columns.h"
 #include "kernels/features/section_areas.h"
 #include "kernels/mesh/facet_roles.h"
 #include "kernels/mesh/weld.h"
@@ -727,6 +728,65 @@ TEST(Undercuts, HeightAndVolumeAgreeWithLinesThroughTurnedBoxes) {
         EXPECT_NEAR(found_highest, highest, 1.5) << "round " << round;
         EXPECT_NEAR(found_volume, volume, 0.02 * volume + 1) << "round " << round;
     }
+}
+
+// Each line of filled_gaps() looked up by itself.
+TEST(Undercuts, ALineCountsForTheHeightWhereItsFourNeighboursHoldSuchAir) {
+    const unsigned seed = test::seed();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    constexpr double side = 40, cell = 0.5;
+    std::array<std::size_t, 4> lacks{};  // the tallest line of a facet only the neighbour on this side
+    for (int round = 0; round < 30; ++round) {
+        Facets t;
+        box(t, {-30, -30, -40}, {side + 30, side + 30, -30});
+        for (int k = 0; k < 4; ++k) {
+            const TurnedBox more = turned_box(random, side);
+            t.insert(t.end(), more.facets.begin(), more.facets.end());
+        }
+        Context context;
+        const Mesh mesh = weld(context, t);
+        const std::vector<double> borders{-40, -12.34, 3.21, 17.77, HUGE_VAL};
+        const ColumnGrid grid{-30 + cell / 2, -30 + cell / 2, cell, 200, 200};
+        const std::vector<std::vector<FilledGap>> rows = filled_gaps(context, mesh.view(), borders, grid);
+        std::set<std::array<long, 3>> held;  // row, column, layer
+        for (std::size_t row = 0; row < rows.size(); ++row)
+            for (const FilledGap& gap : rows[row])
+                held.insert({static_cast<long>(row), long{gap.column}, long{gap.layer}});
+        std::vector<FilledUnder> expected(mesh.facets.size());
+        std::vector<double> tallest(mesh.facets.size());
+        std::vector<int> lacking(mesh.facets.size());  // of the tallest line: a bit for each neighbour
+        for (std::size_t row = 0; row < rows.size(); ++row)
+            for (const FilledGap& gap : rows[row]) {
+                FilledUnder& under = expected[gap.facet];
+                const double height = gap.high - gap.low;
+                under.volume_mm3 += height * cell * cell;
+                const long r = static_cast<long>(row), c = gap.column, layer = gap.layer;
+                const std::array<std::array<long, 3>, 4> around{
+                    {{r, c - 1, layer}, {r, c + 1, layer}, {r - 1, c, layer}, {r + 1, c, layer}}};
+                int lacks_now = 0;
+                for (std::size_t k = 0; k < 4; ++k) lacks_now |= held.count(around[k]) != 0 ? 0 : 1 << k;
+                if (height > tallest[gap.facet]) tallest[gap.facet] = height, lacking[gap.facet] = lacks_now;
+                if (lacks_now != 0 || height <= under.height_mm) continue;
+                under.height_mm = height;
+                under.x = grid.x0 + static_cast<double>(c) * cell;
+                under.y = grid.y0 + static_cast<double>(r) * cell;
+                under.z = gap.high;
+                under.layer = gap.layer;
+            }
+        const std::vector<FilledUnder> found = filled_under(context, mesh.view(), borders, cell);
+        ASSERT_EQ(found.size(), expected.size());
+        for (std::size_t f = 0; f < found.size(); ++f) {
+            EXPECT_NEAR(found[f].volume_mm3, expected[f].volume_mm3, 1e-9 * (1 + expected[f].volume_mm3));
+            EXPECT_EQ(found[f].height_mm, expected[f].height_mm);
+            EXPECT_NEAR(found[f].x, expected[f].x, 1e-9);
+            EXPECT_NEAR(found[f].y, expected[f].y, 1e-9);
+            EXPECT_EQ(found[f].z, expected[f].z);
+            EXPECT_EQ(found[f].layer, expected[f].layer);
+            for (std::size_t k = 0; k < 4; ++k) lacks[k] += lacking[f] == 1 << k;
+        }
+    }
+    for (const std::size_t facets : lacks) EXPECT_GT(facets, 0U) << "nothing tells of this neighbour";
 }
 
 TEST(Undercuts, HundredThousandFacetsAreQuick) {

@@ -97,6 +97,25 @@ TEST(GcodeReader, HowFarCornersMayBeRounded) {
     EXPECT_EQ(refused_body("G61 P0.1\n"), "gcode.unused_word nc/x.ngc:8");
 }
 
+TEST(GcodeReader, CornersAreRoundedAsBeforeUntilAnOperationSaysOtherwise) {
+    std::string text = kHead;
+    text.replace(text.find(kBlend), kBlend.size(), " G64 P0.1 Q0.03");
+    const std::string cut = "G0 X0 Y0 Z1\nG1 X1 F10\n";
+    const std::vector<Program> read = read_operations(
+        text + cut + "M5\nT4 M6\nG43 H4\nS9000 M3\n" + cut + "S8000 M3\nG64 P0.05 Q0\n" + cut + "M5\nM2\n",
+        "nc/test.ngc", dialect_of(Post::linuxcnc));
+    ASSERT_EQ(read.size(), 3u);
+    for (const std::size_t k : {0U, 1U}) {
+        EXPECT_EQ(read[k].tool, k == 0 ? 3 : 4);
+        EXPECT_EQ(read[k].blend, 0.1);
+        EXPECT_EQ(read[k].strays, 0.1 + 0.03);
+        EXPECT_EQ(read[k].strays_line, 3u);
+    }
+    EXPECT_EQ(read[2].blend, 0.05);
+    EXPECT_EQ(read[2].strays, 0.05);
+    EXPECT_EQ(read[2].strays_line, 17u);
+}
+
 TEST(GcodeReader, ArcsStayWithinTheirTolerance) {
     struct Case {
         std::string text;

@@ -341,6 +341,23 @@ TEST(Holes, SayWhereTheirMouthAndStepsAre) {
     EXPECT_NEAR(drilled->steps[1].to_mm, 15 + 0.6009 * 3, 1e-4);
 }
 
+TEST(Holes, AreListedFrom1To150Millimetres) {
+    std::mt19937 random(test::seed());
+    Context context;
+    test::DrilledPlate plate(170, 30);
+    const std::vector<double> angles = test::turn(160, 0, 0, random);
+    for (const double diameter : {0.98, 1.02, 149.5, 150.5}) {
+        const LoopAxis axis{{plate.next_x() + 85, 85, 0}};
+        plate.cell(170, axis, {axis.ring(angles, diameter / 2, 30), axis.ring(angles, diameter / 2, 0)},
+                   nullptr);
+    }
+    const std::vector<RoundHole> found =
+        find_holes(context, mesh_of(context, plate.closed(), kAsItIs).view());
+    ASSERT_EQ(found.size(), 2u);
+    EXPECT_NEAR(found[0].diameter_mm, 1.02, 2e-3);
+    EXPECT_NEAR(found[1].diameter_mm, 149.5, 2e-3);
+}
+
 TEST(Holes, RefuseDiametersOutOfOrder) {
     Context context;
     for (const HoleOptions& options :

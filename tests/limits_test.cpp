@@ -9,6 +9,7 @@
 #include "engine/forces/deep_runs.h"
 #include "engine/forces/feeds.h"
 #include "engine/forces/op_forces.h"
+#include "engine/planner/rating.h"
 #include "tests/support/plate.h"
 
 namespace slabwright {
@@ -47,6 +48,37 @@ TEST(Limits, ABallTakesThinShells) {
         EXPECT_TRUE(found.empty()) << deep << " " << found[0].message;
         EXPECT_LE(op.wall_error_mm, bending_limit(op, plan.job)) << deep;
         EXPECT_GT(op.wall_error_mm, 0);
+    }
+}
+
+// Where cuts are taken as nominal, a cutter that bends by over a hundredth more than it may is told.
+TEST(Limits, ANominalCutThatBendsTooFarIsTold) {
+    Plan plan = plate();
+    plan.job.cutting.engagement = Engagement::nominal;
+    plan.job.cutting.wall_allowance = plan.job.cutting.floor_allowance = 0;
+    for (const auto& [kind, code] : {std::pair{OperationKind::finish, "cut.deflection"},
+                                     std::pair{OperationKind::rough, "rough.deflection"}}) {
+        Operation op = slot(plan, kind, 2, 40, 15, 5000);
+        op.stepdown = 3;
+        const auto told = [&](double allowed) {
+            plan.job.tolerances.cusp = allowed;
+            EXPECT_EQ(bending_limit(op, plan.job), allowed);
+            std::vector<Diagnostic> found;
+            rate(plan.job, plan.layers[0], op, found);
+            return found;
+        };
+        EXPECT_TRUE(told(1).empty());
+        const double bends = op.deflection_mm;
+        ASSERT_GT(bends, 0);
+        for (const double share : {0.1, 0.99, 1.0, 1.009})
+            EXPECT_TRUE(told(bends / share).empty()) << code << " " << share;
+        for (const double share : {1.011, 2.0, 10.0}) {
+            const std::vector<Diagnostic> found = told(bends / share);
+            ASSERT_EQ(found.size(), 1U) << code << " " << share;
+            EXPECT_EQ(found[0].code, code);
+            EXPECT_EQ(found[0].severity, Severity::warning);
+        }
+        EXPECT_EQ(op.deflection_mm, bends);
     }
 }
 

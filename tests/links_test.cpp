@@ -229,6 +229,24 @@ TEST(Links, LiftJustOverThePartAndNotOverStockThatIsGone) {
     EXPECT_EQ(bench.operation.moves.back().z, to_units(kClearance));
 }
 
+TEST(Links, RapidsStayOverTheBottomOfTheLayer) {
+    for (const double bottom : {0.0, 3.0})
+        for (const double deep : {0.0, 1.0}) {
+            Bench bench;
+            bench.layer.z_bottom = bottom;
+            PathBuilder path = bench.builder();
+            // Beside the stock, where nothing stands, and farther apart than it stays down.
+            path.follow(line(-40, -15, -36, -15, bottom - deep));
+            path.follow(line(-36, 35, -40, 35, bottom - deep));
+            double lowest = 1e300, lowest_cut = 1e300;
+            for (const Move& move : bench.operation.moves)
+                if (move.feed == 0) lowest = std::min(lowest, to_mm(move.z));
+                else lowest_cut = std::min(lowest_cut, to_mm(move.z));
+            EXPECT_NEAR(lowest_cut, bottom - deep, 1e-9);
+            EXPECT_NEAR(lowest, bottom + PathBuilder::kStop, 1e-9);
+        }
+}
+
 TEST(Links, DoNotCrossStockThatStands) {
     Bench bench;  // nothing has been cleared
     PathBuilder path = bench.builder();

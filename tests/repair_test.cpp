@@ -18,6 +18,7 @@
 #include "kernels/repair/bodies.h"
 #include "kernels/repair/rebuild.h"
 #include "kernels/repair/soup.h"
+#include "kernels/repair/t_junctions.h"
 #include "kernels/repair/triangulate.h"
 #include "kernels/repair/winding.h"
 #include "kernels/slicing/slicing.h"
@@ -246,6 +247,34 @@ TEST(Repair, EachDefectIsMendedToldAndTheSolidIsTheSame) {
             EXPECT_NEAR(mended_sections[i], sections[i], off * 300 + 1e-2) << "section " << i;
         EXPECT_FALSE(mended(result.mesh).needed) << "what was mended needs no mending";
         for (const int threads : {2, 4}) EXPECT_TRUE(same_bytes(mended(mesh, threads).mesh, result.mesh));
+    }
+}
+
+TEST(Repair, OfTheVerticesThatSplitEdgesTheFarthestIsTold) {
+    Random random(test::seed());
+    std::uniform_real_distribution<float> away(1e-3F, 0.04F);
+    Context context({.threads = 1});
+    for (int round = 0; round < 20; ++round) {
+        // Pairs of triangles below and above an edge; those above meet at a vertex that lies off it.
+        FacetSoup soup;
+        double farthest = 0;
+        Xyz where{};
+        const auto edges = static_cast<std::uint32_t>(1 + draw(random, 9));
+        for (std::uint32_t k = 0; k < edges; ++k) {
+            const float x = 20 * static_cast<float>(k), y = away(random);
+            const std::uint32_t a = 5 * k, b = a + 1, middle = a + 2, below = a + 3, above = a + 4;
+            for (const Vec3f& v : {Vec3f{x, 0, 0}, Vec3f{x + 8, 0, 0}, Vec3f{x + 4, y, 0},
+                                   Vec3f{x + 4, -5, 0}, Vec3f{x + 4, 5, 0}})
+                soup.vertices.push_back(v);
+            for (const Index3& f : {Index3{b, a, below}, Index3{a, middle, above}, Index3{middle, b, above}})
+                soup.facets.push_back(f);
+            if (double{y} > farthest) farthest = y, where = soup.at(middle);
+        }
+        const EdgeSplits split = split_at_vertices(context, soup, sorted_uses(context, soup), 0.05, 0);
+        EXPECT_EQ(split.edges, edges);
+        EXPECT_EQ(soup.facets.size(), 4 * edges);
+        EXPECT_NEAR(split.farthest_mm, farthest, 1e-9);
+        EXPECT_EQ(split.where, where);
     }
 }
 

@@ -11,12 +11,14 @@
 
 #include "engine/simulate/replay.h"
 #include "io/read/pattern_mesh.h"
+#include "io/sheets_html.h"
 #include "io/slabwright.h"
 #include "io/text/base64.h"
 #include "io/write/thinned_path.h"
 #include "kernels/access/standing_part.h"
 #include "tests/support/files.h"
 #include "tests/support/places.h"
+#include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -224,6 +226,51 @@ TEST(Report, NothingInAPlanEndsTheScriptThatCarriesIt) {
     const std::string page = slurp(fs::path(out) / "report.html");
     EXPECT_EQ(page.find("alert(1)<"), std::string::npos);
     EXPECT_EQ(data_of(page)["plan"]["layers"][0]["reason"], name);
+}
+
+TEST(AssemblyPage, HoldsBothDocumentsAndEachWayOfEachProgram) {
+    if (!reports_are_built()) {
+        std::printf("skipped: the report was not built\n");
+        return;
+    }
+    std::mt19937 random(test::seed());
+    json sheets, verdict;
+    sheets["name"] = "</script> & <!--";
+    verdict["passed"] = true;
+    for (std::size_t count = 0; count < 5; ++count) {
+        std::vector<ReadSheetProgram> programs(count);
+        json expected = json::array();
+        for (ReadSheetProgram& program : programs) {
+            program.thickness = 6;
+            json ways = json::array();
+            for (std::size_t k = random() % 4; k-- > 0;) {
+                // From the way in to a polygon, all of whose corners are seen.
+                ReadWay& way = program.ways.emplace_back();
+                way.piece = static_cast<int>(random() % 9), way.pass = static_cast<int>(random() % 3);
+                way.is_hole = random() % 2 == 0;
+                way.points.push_back({500, 500});
+                const int corners = 3 + static_cast<int>(random() % 9);
+                json ends = json::array();
+                for (int i = 0; i <= corners; ++i) {
+                    const double turn = 2 * std::numbers::pi * (i % corners) / corners,
+                                 x = 80 + 20 * std::cos(turn), y = 60 + 20 * std::sin(turn);
+                    way.points.push_back({x, y});
+                    if (i == corners) continue;
+                    ends.push_back(std::llround(100 * x)), ends.push_back(std::llround(100 * y));
+                }
+                ways.push_back({{"piece", way.piece},
+                                {"pass", way.pass},
+                                {"hole", way.is_hole},
+                                {"top", ends},
+                                {"bottom", ends}});
+            }
+            expected.push_back(ways);
+        }
+        const json data = data_of(assembly_html(sheets.dump(), verdict.dump(), programs));
+        EXPECT_EQ(data["sheets"], sheets);
+        EXPECT_EQ(data["verify"], verdict);
+        EXPECT_EQ(data["ways"], expected);
+    }
 }
 
 TEST(Report, RefusesWhatItCannotUnderstand) {

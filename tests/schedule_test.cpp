@@ -157,6 +157,21 @@ TEST(Schedule, EachLayerGoesThroughTheMachineInOrder) {
     }
 }
 
+TEST(Schedule, ATurnedSlabLiesOnTheBoard) {
+    Plan under = plan_of_layers(1);
+    under.turned.emplace().layer = 1;
+    schedule(under);
+    std::vector<std::string> actions;
+    for (const SequenceStep& step : under.sequence) {
+        actions.push_back(step.action);
+        if (step.action == "place") {
+            EXPECT_EQ(number(step, "z_bottom_mm"), 0);
+        }
+    }
+    EXPECT_EQ(std::count(actions.begin(), actions.end(), "place"), 1);
+    EXPECT_EQ(std::count(actions.begin(), actions.end(), "glue"), 0);
+}
+
 // Slabs that the machine carries take as long as its axes do.
 TEST(Schedule, TheHandlersAxisGivesItsTimes) {
     Plan plan = plan_of_layers(2);

@@ -11,6 +11,7 @@
 
 #include "io/read/pattern_mesh.h"
 #include "io/slabwright.h"
+#include "io/split.h"
 #include "io/write/stl_writer.h"
 #include "kernels/access/closest_point.h"
 #include "kernels/halves/halves.h"
@@ -181,6 +182,25 @@ TEST(Split, ValveBodyIsItselfAgain) {
                     halves.dowels.size(), volume(halves) / valve.report.volume_mm3);
         EXPECT_LE(most, 1e-3);
         EXPECT_NEAR(volume(halves) / valve.report.volume_mm3, 1, 1e-4);
+    }
+}
+
+TEST(Split, EachHalfIsInTheFileOfItsName) {
+    Context context({.threads = 1});
+    const TemporaryFolder folder;
+    const std::string block = folder / "block.stl";
+    write_stl(block, weld(context, shapes::box({0, 0, 0}, {100, 60, 80})));
+    SplitRequest request;
+    request.plane.offset_mm = 30;
+    request.out = {folder / "above.stl", folder / "below.3mf"};
+    const SplitModel model = split_model(context, PatternSource{block}, Job{}, request);
+    EXPECT_EQ(model.height_mm[0], 50);
+    EXPECT_EQ(model.height_mm[1], 30);
+    for (const std::size_t side : {0U, 1U}) {
+        const PatternMesh half = read_pattern_mesh(context, request.out[side], {});
+        EXPECT_EQ(half.mesh.facets.size(), model.facets[side]);
+        EXPECT_EQ(half.report.box.max.z - half.report.box.min.z, model.height_mm[side]);
+        EXPECT_NEAR(half.report.volume_mm3, model.volume_mm3[side], 1);
     }
 }
 

@@ -608,6 +608,30 @@ TEST(Stock, ARegionIsCutAsItsWaysAre) {
     EXPECT_GT(cut, 100U);
 }
 
+TEST(Stock, TheHighestIsThatOfAllColumns) {
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-1, 7), uz(-2, 9), ur(0.5, 12);
+    const CellGrid grid{0.1, 0.2, 0.31, 20, 18};
+    std::size_t below = 0, bare = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+        Stock stock(grid);
+        for (int slab = 0; slab < trial % 4; ++slab) {
+            stock.add_slab(3 * slab, 3);
+            for (int k = 0; k < 3; ++k)
+                stock.cut({CutterEnd::Form::ball, ur(random), 0}, {u(random), u(random), uz(random)},
+                          {u(random), u(random), uz(random)});
+        }
+        double highest = -1e300;
+        for (std::size_t c = 0; c < grid.count(); ++c) highest = std::max(highest, stock.top(c));
+        EXPECT_EQ(stock.highest(), highest) << "seed " << seed << ", trial " << trial;
+        below += trial % 4 > 1 && highest > 0 && highest <= 3.0 * (trial % 4 - 1);  // the topmost is gone
+        bare += stock.slabs() > 0 && highest <= 0;
+    }
+    EXPECT_GT(below, 0U);
+    EXPECT_GT(bare, 0U);
+}
+
 // Level passes of a ball on a plane at α leave L = R − √(R² − (SD / (2 sin α))²) (METHOD.md section 5).
 TEST(Stock, CuspOfLevelPassesOnAPlane) {
     const double R = 3.175, alpha = 50 * std::numbers::pi / 180, cusp = 0.1;
