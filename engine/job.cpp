@@ -228,8 +228,11 @@ double tip_diameter(const Tool& tool) {
 
 namespace {
 
+// What bends like a fluted cylinder of a tool's shank, which is solid.
+double shank_bending_as(const Tool& tool) { return tool.shank_diameter / kFluteDiameterShare; }
+
 // Calls fn(z, diameter, dz) for thin slices of a cutter with a taper from where it is loaded up to its
-// holder; z over the load.
+// holder; z over the load, and the diameter of what is fluted and bends as much.
 template <class Fn>
 void each_slice(const Tool& tool, Fn&& fn) {
     constexpr int kSlices = 200;
@@ -239,21 +242,33 @@ void each_slice(const Tool& tool, Fn&& fn) {
     const double dz = (tool.stickout - load) / kSlices;
     for (int k = 0; k < kSlices; ++k) {
         const double z = load + (k + 0.5) * dz,
-                     radius = shape.corner * std::cos(shape.taper_rad) + std::max(0.0, z - from) * tangent,
-                     widest = z > tool.flute_length ? std::max(tool.shank_diameter, tool.diameter) / 2
-                                                    : tool.diameter / 2;
-        fn(z - load, 2 * std::min(radius, widest), dz);
+                     radius = shape.corner * std::cos(shape.taper_rad) + std::max(0.0, z - from) * tangent;
+        const bool solid = z > tool.flute_length;
+        const double width = 2 * std::min(radius, (solid ? tool.shank_diameter : tool.diameter) / 2);
+        fn(z - load, solid ? width / kFluteDiameterShare : width, dz);
     }
 }
+
+bool is_upright(const Tool& tool) { return !has_taper(tool.kind) && tool.kind != ToolKind::cone; }
+
+double fluted_length(const Tool& tool) { return std::min(tool.flute_length, tool.stickout); }
 
 }  // namespace
 
 double bending_diameter(const Tool& tool) {
-    if (!has_taper(tool.kind) && tool.kind != ToolKind::cone) return tool.diameter;
-    double sum = 0;
-    each_slice(tool, [&](double z, double d, double dz) { sum += z * z / (d * d * d * d) * dz; });
+    const auto cube = [](double v) { return v * v * v; };
     const double length = tool.stickout;
-    return std::pow(length * length * length / (3 * sum), 0.25);
+    double sum = 0;
+    if (is_upright(tool)) {
+        const double fluted = fluted_length(tool);
+        if (fluted == length) return tool.diameter;
+        sum = (cube(fluted) / std::pow(tool.diameter, 4) +
+               (cube(length) - cube(fluted)) / std::pow(shank_bending_as(tool), 4)) /
+              3;
+    } else {
+        each_slice(tool, [&](double z, double d, double dz) { sum += z * z / (d * d * d * d) * dz; });
+    }
+    return std::pow(cube(length) / (3 * sum), 0.25);
 }
 
 double tip_bent_by(const Tool& tool, double force_n) {
@@ -261,9 +276,15 @@ double tip_bent_by(const Tool& tool, double force_n) {
 }
 
 double strength_diameter(const Tool& tool) {
-    if (!has_taper(tool.kind) && tool.kind != ToolKind::cone) return tool.diameter;
+    const auto cube = [](double v) { return v * v * v; };
     double most = 0;
-    each_slice(tool, [&](double z, double d, double) { most = std::max(most, z / (d * d * d)); });
+    if (is_upright(tool)) {
+        const double fluted = fluted_length(tool);
+        if (fluted == tool.stickout) return tool.diameter;
+        most = std::max(fluted / cube(tool.diameter), tool.stickout / cube(shank_bending_as(tool)));
+    } else {
+        each_slice(tool, [&](double z, double d, double) { most = std::max(most, z / (d * d * d)); });
+    }
     return std::cbrt(tool.stickout / most);
 }
 

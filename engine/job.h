@@ -460,14 +460,14 @@ struct Job {
 /// What the tip of a tool is wide in which it makes a hollow: the diameter, or that of a tapered ball's tip;
 /// nothing of a cone, mm.
 [[nodiscard]] double tip_diameter(const Tool& tool);
-/// The diameter of the upright cutter of the same stick-out that bends as much as this one, mm: of a cutter
-/// with a taper 1/L³·3∫(z − a)²/d⁴ = 1/d⁴ over z from a to L, loaded at a, its tip's radius or half its
-/// largest step over the tip.
+/// The diameter of the cutter fluted to the holder that bends as this one of the same stick-out, mm: 1/D⁴ =
+/// 3∫(z − a)²/d⁴/L³ over z from a to L, where d is the shank's / .8 over the flutes, loaded at its tip (a =
+/// 0), or with a taper at a, its tip's radius or half its largest step over the tip.
 [[nodiscard]] double bending_diameter(const Tool& tool);
 /// How far a force across it bends its tip, mm (cutter_deflection, of a cutter as wide as bending_diameter).
 /// @throws Error(usage, "forces.tool") for a negative force
 [[nodiscard]] double tip_bent_by(const Tool& tool, double force_n);
-/// The diameter of the upright cutter that is bent as hard at the holder as this one where that is worst, mm.
+/// The diameter of one fluted to the holder that is bent as hard there as this is where that is worst, mm.
 [[nodiscard]] double strength_diameter(const Tool& tool);
 /// Whether it roughs or finishes layers from top to bottom: flat, bull-nose, ball and tapered ball end mills.
 [[nodiscard]] bool is_end_mill(ToolKind kind);

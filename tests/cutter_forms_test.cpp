@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <random>
 #include <string>
 
 #include "engine/simulate/gouge.h"
@@ -22,6 +23,7 @@
 #include "tests/support/files.h"
 #include "tests/support/places.h"
 #include "tests/support/schema.h"
+#include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -152,8 +154,6 @@ TEST(CutterForms, AreReadFromCsvAndFreecadsBits) {
 TEST(CutterForms, BendAsTheirTaperSays) {
     const Job job = job_from_toml(kTapered + kHolder, "t");
     Tool tool = job.tools[0];
-    EXPECT_EQ(bending_diameter(job.tools[1]), job.tools[1].diameter);
-    EXPECT_EQ(strength_diameter(job.tools[1]), job.tools[1].diameter);
     tool.diameter = 20, tool.shank_diameter = 20, tool.flute_length = tool.stickout = 60;
     tool.corner_radius = 2, tool.taper_deg = 6;
     const double tangent = std::tan(6 * std::numbers::pi / 180), low = 2 * (1 - std::sin(std::atan(tangent)));
@@ -168,6 +168,32 @@ TEST(CutterForms, BendAsTheirTaperSays) {
     const double at = std::min(58.0, d0 / (2 * 2 * tangent));
     const double hardest = at / std::pow(d0 + 2 * tangent * at, 3);
     EXPECT_NEAR(strength_diameter(tool), std::cbrt(60 / hardest), 2e-2 * std::cbrt(60 / hardest));
+}
+
+// Luo's cutter is fluted up to the holder and .8 as thick as it is wide; a shank over the flutes is solid.
+TEST(CutterForms, BendAsTheirShankSays) {
+    Tool tool = tool_of_kind(Job{}, ToolKind::flat);
+    tool.flute_length = tool.stickout;
+    EXPECT_EQ(bending_diameter(tool), tool.diameter);
+    EXPECT_EQ(strength_diameter(tool), tool.diameter);
+    std::mt19937 random(test::seed());
+    const auto draw = [&](double low, double high) {
+        return std::uniform_real_distribution<>(low, high)(random);
+    };
+    for (int n = 0; n < 50; ++n) {
+        tool.diameter = draw(2, 30), tool.shank_diameter = draw(2, 30);
+        tool.stickout = draw(20, 90), tool.flute_length = std::floor(draw(10, 100)) / 100 * tool.stickout;
+        // The lever of a force at the tip, slice by slice: its turn at z moves the tip by z times as much.
+        const double force = draw(1, 100), modulus = 1e3 * tool.modulus_gpa, dz = tool.stickout / 20000;
+        double bent = 0, stress = 0;
+        for (double z = dz / 2; z < tool.stickout; z += dz) {
+            const double d = z < tool.flute_length ? 0.8 * tool.diameter : tool.shank_diameter;
+            bent += force * z / (modulus * std::numbers::pi / 64 * std::pow(d, 4)) * z * dz;
+            stress = std::max(stress, force * z / (std::numbers::pi / 32 * std::pow(d, 3)));
+        }
+        EXPECT_NEAR(tip_bent_by(tool, force), bent, 1e-3 * bent);
+        EXPECT_NEAR(cutter_stress(force, tool.stickout, strength_diameter(tool)), stress, 1e-3 * stress);
+    }
 }
 
 TEST(CutterForms, AHolderInProfileIsCheckedAsItsCones) {

@@ -180,7 +180,7 @@ TEST(Feeds, AStiffCutterKeepsItsFeedAndAnElasticOneSlowsDown) {
     Job& job = plan.job;
     job.cutting.wall_allowance = job.cutting.floor_allowance = 0.06;
     job.tolerances.cusp = 0.01;
-    job.tools[1].stickout = 118;
+    job.tools[1].flute_length = job.tools[1].stickout = 118;
     plan.layers[0].operations = {slot(40)};
     rate_layer(context, plan.layers[0], plan, diagnostics);
     const Operation elastic = plan.layers[0].operations[0];
@@ -599,7 +599,7 @@ TEST(Feeds, AnOperationMayBendItsCutterByWhatItLeaves) {
 // thinner and thinner shells would leave the highest of them all of that.
 TEST(Feeds, PassesForACutHighOverTheTip) {
     Plan plan = plate();
-    plan.job.tools[2].stickout = 46;
+    plan.job.tools[2].flute_length = plan.job.tools[2].stickout = 46;
     const Tool &flat = plan.job.tools[1], &ball = plan.job.tools[2];
     Context context;
     int passes = 0, over = 0;

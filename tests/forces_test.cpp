@@ -594,7 +594,8 @@ Operation straight(OperationKind kind, double stepdown, double stepover, std::ui
 
 TEST(RateOperation, GrowsWithFeedDepthAndStickout) {
     Job job;
-    const Tool flat = job.tools[1];
+    Tool flat = job.tools[1];
+    flat.flute_length = flat.stickout;
     Operation slow = straight(OperationKind::rough, 3, 6.35, 3000),
               fast = straight(OperationKind::rough, 3, 6.35, 9000),
               deep = straight(OperationKind::rough, 6, 6.35, 3000);
@@ -615,7 +616,7 @@ TEST(RateOperation, GrowsWithFeedDepthAndStickout) {
     EXPECT_NEAR(slow.deflection_mm, cutter_deflection(f.peak_in_plane_n, flat.stickout, flat.diameter),
                 1e-12);
     Tool longer = flat;
-    longer.stickout *= 2;
+    longer.flute_length = longer.stickout *= 2;
     Operation op = straight(OperationKind::rough, 3, 6.35, 3000);
     rate_operation(op, longer, job);
     EXPECT_NEAR(op.deflection_mm, 8 * slow.deflection_mm, 1e-9);

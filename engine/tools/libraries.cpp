@@ -12,6 +12,7 @@ struct Size {
     const char* name;
     double diameter, stepdown_min, stepdown_max;
     double flute, stickout, holder;
+    double shank = diameter;
 };
 
 Tool end_mill(int number, ToolKind kind, const Size& size) {
@@ -19,7 +20,8 @@ Tool end_mill(int number, ToolKind kind, const Size& size) {
     tool.number = number;
     tool.kind = kind;
     tool.name = std::string(kind == ToolKind::flat ? "flat end mill " : "ball end mill ") + size.name;
-    tool.diameter = tool.shank_diameter = size.diameter;
+    tool.diameter = size.diameter;
+    tool.shank_diameter = size.shank;
     tool.flute_length = size.flute;
     tool.stickout = size.stickout;
     tool.holder_diameter = size.holder;
@@ -57,6 +59,12 @@ Size in_mm(const char* name, double diameter, const LuoRow& row, double flute, d
     return {name, diameter, row.low * scale, row.high * scale, flute, stickout, holder};
 }
 
+// The size with its cutter on a thicker shank.
+Size on_shank(Size size, double shank) {
+    size.shank = shank;
+    return size;
+}
+
 }  // namespace
 
 std::vector<Tool> luo_library() {
@@ -73,12 +81,15 @@ std::vector<Tool> luo_library() {
 }
 
 std::vector<Tool> shop_library() {
+    // Slender cutters are bought on thicker shanks, which bend less; their flutes are longer than a layer is
+    // tall.
+    const Size eighth = on_shank(in_inches("1/8 in", kEighth, kInch, 36, 32), 0.25 * kInch);
     std::vector<Tool> tools = Job{}.tools;
     tools.push_back(end_mill(4, ToolKind::flat, in_inches("1 in", kWhole, 50.8, 75, 50)));
-    tools.push_back(end_mill(5, ToolKind::flat, in_inches("1/4 in", kQuarter, 30, 45, 32)));
-    tools.push_back(end_mill(6, ToolKind::flat, in_inches("1/8 in", kEighth, 25.4, 38, 32)));
+    tools.push_back(end_mill(5, ToolKind::flat, in_inches("1/4 in", kQuarter, kInch, 38, 32)));
+    tools.push_back(end_mill(6, ToolKind::flat, eighth));
     tools.push_back(end_mill(7, ToolKind::ball, in_inches("1/2 in", kHalf, 32, 50, 40)));
-    tools.push_back(end_mill(8, ToolKind::ball, in_inches("1/8 in", kEighth, 25.4, 38, 32)));
+    tools.push_back(end_mill(8, ToolKind::ball, eighth));
     make_of_carbide(tools);
     return tools;
 }
@@ -107,7 +118,7 @@ std::vector<Tool> forms_library() {
 }
 
 std::vector<Tool> metric_library() {
-    const Size three = in_mm("3 mm", 3, kEighth, 24, 38, 32);
+    const Size three = on_shank(in_mm("3 mm", 3, kEighth, 24, 35, 32), 6);
     const Size six = in_mm("6 mm", 6, kQuarter, 30, 45, 32);
     const Size twelve = in_mm("12 mm", 12, kHalf, 32, 50, 40);
     std::vector<Tool> tools{Job{}.tools.front()};

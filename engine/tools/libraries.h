@@ -15,8 +15,8 @@ namespace slabwright {
 [[nodiscard]] std::vector<Tool> luo_library();
 
 /// What a shop that mills wood has: the three tools of the fixed set, unchanged and with their numbers, then
-/// flat end mills of 1, 1/4 and 1/8 in and ball end mills of 1/2 and 1/8 in, numbers 4 … 8. Stepdowns are
-/// those of LUO table 5.4; lengths, holders and which sizes there are, are ours (METHOD.md section 7).
+/// flat end mills of 1, 1/4 and 1/8 in and ball end mills of 1/2 and 1/8 in, numbers 4 … 8, those of 1/8 in
+/// on shanks of 1/4 in. Stepdowns are LUO table 5.4's; lengths, holders and which sizes there are, are ours.
 [[nodiscard]] std::vector<Tool> shop_library();
 
 /// The same in millimetres: face mill 50, flat 12 and ball 6 with the numbers of the fixed set, then flat end
