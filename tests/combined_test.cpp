@@ -7,7 +7,9 @@
 #include <cstdio>
 #include <random>
 
+#include "engine/layers/candidates.h"
 #include "engine/layers/combined.h"
+#include "engine/layers/tool_map.h"
 #include "engine/planner/planner.h"
 #include "kernels/errors.h"
 #include "tests/support/height_field.h"
@@ -128,6 +130,74 @@ TEST(PlaceByTools, KeepsTheToolChangesAndTheLengths) {
     EXPECT_THROW(
         (void)place_layers_by_tools(request, std::vector<ToolSlice>{{0, 30, 1}}, std::vector<double>{12, 35}),
         Error);
+}
+
+// Beside `optimal` and `printed` stand what bonded slabs allow, but where that breaks more, or is the same.
+TEST(Combined, CandidatesAreOtherAndBreakNoMoreThanOptimal) {
+    std::mt19937 random(test::seed());
+    Context context;
+    Job job;
+    for (const std::size_t tool : {std::size_t{1}, std::size_t{2}})
+        job.tools[tool].flute_length = 48, job.tools[tool].stickout = 56;
+    int more = 0, kept_broken = 0;
+    for (int round = 0; round < 40; ++round) {
+        const Mesh mesh =
+            test::random_height_field(context, 4, 12, 60, 1, static_cast<std::uint32_t>(random()));
+        LayerRequest request;
+        for (const Vec3f& v : mesh.vertices) request.height = std::max(request.height, double{v.z});
+        request.max_layer = 18.5, request.min_layer = 3, request.min_material = 5;
+        request.slab_thicknesses = {19};
+        request.facing_allowance = 0.5;
+        request.section_area = [](double) { return 1000; };
+        for (std::size_t n = random() % 7; n-- > 0;) {
+            Feature feature;
+            feature.type =
+                std::array{FeatureType::peak, FeatureType::down_flat, FeatureType::up_flat}[random() % 3];
+            feature.z_low = feature.z_high = static_cast<double>(1 + random() % 50);
+            feature.area = 100;
+            request.features.push_back(feature);
+        }
+        const std::vector<LayerCandidate> candidates = layer_candidates(context, mesh.view(), job, request);
+        ASSERT_GE(candidates.size(), 1U);
+        EXPECT_EQ(candidates[0].name, "optimal");
+        const auto same = [](const LayerPlacement& a, const LayerPlacement& b) {
+            return std::equal(
+                a.boundaries.begin(), a.boundaries.end(), b.boundaries.begin(), b.boundaries.end(),
+                [](const Boundary& p, const Boundary& q) { return std::abs(p.z - q.z) < kSameHeight; });
+        };
+        std::vector<LayerPlacement> before{place_layers_optimal(request)};
+        const LayerCost usual = before[0].cost;
+        const auto expect = [&](const char* name, const LayerPlacement& placement) {
+            const LayerCost& cost = placement.cost;
+            const bool breaks_more = cost.broken_type2 > usual.broken_type2 ||
+                                     cost.broken_type1 > usual.broken_type1 ||
+                                     cost.thin_layers > usual.thin_layers;
+            const bool is_known = std::any_of(before.begin(), before.end(), [&](const LayerPlacement& other) {
+                return same(other, placement);
+            });
+            const bool wanted = !is_known && (!breaks_more || std::string(name) == "printed");
+            const auto found = std::find_if(candidates.begin(), candidates.end(),
+                                            [&](const LayerCandidate& c) { return c.name == name; });
+            ASSERT_EQ(found != candidates.end(), wanted) << round << ": " << name;
+            if (wanted) {
+                EXPECT_TRUE(same(found->placement, placement)) << round << ": " << name;
+                before.push_back(placement);
+            }
+            more += !is_known && !wanted ? 1 : 0;
+            kept_broken += wanted && cost.broken_type1 + cost.broken_type2 + cost.thin_layers > 0 ? 1 : 0;
+        };
+        expect("printed", place_layers_printed(request));
+        LayerRequest bonded = request;
+        bonded.max_layer = max_bonded_layer_thickness(job);
+        expect("bonded slabs", place_layers_optimal(bonded));
+        const ToolMap map = tool_map(context, mesh.view(), job, request.features);
+        bonded.max_layer = max_layer_of_longest(job);
+        expect("layers by tools",
+               place_layers_by_tools(bonded, join_slices(map.slices, map.allowed_mm, request.min_layer),
+                                     map.allowed_mm));
+    }
+    EXPECT_GT(more, 0) << "left out since they break more";
+    EXPECT_GT(kept_broken, 0);
 }
 
 // A block with two steps: whatever the other strategies make of it, combined takes no longer, and says what

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -163,6 +164,53 @@ TEST(IdleWays, WhatKeepsOffByLessThanACellHidesWhatItLeaves) {
         const std::vector<char> cuts = which_cut(context, stock, cutter_shape(ball), ways, 0.05);
         EXPECT_EQ(cuts, (std::vector<char>{1, 0, 0})) << spare;
     }
+}
+
+// Once around the part, half of it where nothing is left: of a closed run the half that cuts stays, wherever
+// the run begins. One that cuts all along stays closed, and one that cuts nowhere goes.
+TEST(IdleRuns, OfAClosedRunWhatCutsStays) {
+    std::mt19937 random(test::seed());
+    Field field(static_cast<std::uint32_t>(random()));
+    LayerStock stock = field.stock(0.5);
+    const CutterShape cutter = flat_cutter(3);
+    const LayerCut cut{field.context, field.layer, field.job, field.solid, kTop, {}, {}, nullptr, &stock};
+    const std::vector<std::array<double, 2>> square{{-36, -36}, {-36, 36}, {36, 36}, {36, -36}};
+    LevelRun round;
+    round.closed = true;
+    const std::size_t begin = random() % 4;
+    for (std::size_t k = 0; k <= 4; ++k) {
+        const std::array<double, 2>& p = square[(begin + k) % 4];
+        round.points.push_back({to_units(p[0]), to_units(p[1]), to_units(5)});
+    }
+    const auto left = [&] {
+        std::vector<std::vector<LevelRun>> groups{{round}};
+        take_out_idle(cut, cutter, 20, groups);
+        return groups.at(0);
+    };
+    const std::vector<LevelRun> whole = left();
+    ASSERT_EQ(whole.size(), 1U);
+    EXPECT_TRUE(whole[0].closed);
+    EXPECT_EQ(whole[0].points, round.points);
+
+    const auto clear = [&](double x0, double x1) {
+        const CutterEnd wide = cutter_end(flat_cutter(6));
+        for (const double y : {-36.0, 36.0}) stock.cut_along(wide, {x0, y, 1}, {x1, y, 1});
+        const double x = std::abs(x0) > std::abs(x1) ? x0 : x1;
+        stock.cut_along(wide, {x, -36, 1}, {x, 36, 1});
+    };
+    clear(-36, 0);
+    const std::vector<LevelRun> half = left();
+    ASSERT_EQ(half.size(), 1U);
+    EXPECT_FALSE(half[0].closed);
+    double length = 0;
+    for (std::size_t k = 1; k < half[0].points.size(); ++k) {
+        const PathPoint &a = half[0].points[k - 1], &b = half[0].points[k];
+        EXPECT_GT(to_mm(std::min(a.x, b.x)), -1);
+        length += std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y));
+    }
+    EXPECT_GE(length, 2 * (36 - 9) + 72) << "where the wide cutter has not been";
+    clear(0, 36);
+    EXPECT_TRUE(left().empty());
 }
 
 struct Made {

@@ -11,6 +11,7 @@
 #include <numbers>
 #include <random>
 
+#include "engine/keep_out.h"
 #include "engine/planner/planner.h"
 #include "engine/schedule/keep_outs.h"
 #include "engine/simulate/keep_out_check.h"
@@ -110,6 +111,60 @@ TEST(KeepOutJob, FaultsAreToldWithKeyAndLine) {
         EXPECT_NE(error.message().find(c.words), std::string::npos) << c.text << error.what();
         EXPECT_EQ(error.place().substr(0, c.place.size()), c.place) << c.text << error.what();
     }
+}
+
+using Grid = std::array<int, 2>;  // a place of whole millimetres
+
+/// Whether two sides have any place in common, by what share of each leads there.
+bool have_a_place_in_common(Grid a, Grid b, Grid c, Grid d) {
+    const int ux = b[0] - a[0], uy = b[1] - a[1], vx = d[0] - c[0], vy = d[1] - c[1], wx = c[0] - a[0],
+              wy = c[1] - a[1];
+    const int across = ux * vy - uy * vx;
+    if (across != 0) {
+        const int sign = across > 0 ? 1 : -1, s = sign * (wx * vy - wy * vx), t = sign * (wx * uy - wy * ux);
+        return s >= 0 && s <= sign * across && t >= 0 && t <= sign * across;
+    }
+    if (wx * uy != wy * ux) return false;  // beside each other
+    const int length = ux * ux + uy * uy, from = wx * ux + wy * uy, to = from + vx * ux + vy * uy;
+    return std::max(from, to) >= 0 && std::min(from, to) <= length;
+}
+
+// Against every pair of sides: neighbours may not fold back, others may not have a place in common.
+TEST(KeepOutJob, APolygonIsTakenExactlyWhenItDoesNotMeetItself) {
+    std::mt19937 random(test::seed());
+    int taken = 0, refused = 0;
+    for (int round = 0; round < 20'000; ++round) {
+        const std::size_t n = 3 + random() % 4;
+        std::vector<Grid> corners(n);
+        for (Grid& p : corners) p = {static_cast<int>(random() % 6) - 2, static_cast<int>(random() % 6) - 3};
+        bool meets = false;
+        std::string said;
+        KeepOut bolt;
+        bolt.name = "bolt";
+        bolt.height = 30;
+        for (std::size_t i = 0; i < n; ++i) {
+            const Grid a = corners[i], b = corners[(i + 1) % n];
+            meets |= a == b;
+            const Grid next = corners[(i + 2) % n];
+            const int ux = b[0] - a[0], uy = b[1] - a[1], vx = next[0] - b[0], vy = next[1] - b[1];
+            meets |= ux * vy == uy * vx && ux * vx + uy * vy < 0;
+            for (std::size_t j = i + 2; j < n; ++j)
+                meets |= (j + 1) % n != i && have_a_place_in_common(a, b, corners[j], corners[(j + 1) % n]);
+            bolt.polygon.push_back({static_cast<double>(a[0]), static_cast<double>(a[1])});
+            said += fmt::format(" ({}, {})", a[0], a[1]);
+        }
+        bool is_taken = true;
+        try {
+            validate_keep_outs({bolt});
+        } catch (const Error& error) {
+            is_taken = false;
+            EXPECT_EQ(error.code(), "job.range");
+        }
+        ASSERT_EQ(is_taken, !meets) << said;
+        ++(is_taken ? taken : refused);
+    }
+    EXPECT_GT(taken, 1000);
+    EXPECT_GT(refused, 1000);
 }
 
 using Spot = std::array<double, 2>;

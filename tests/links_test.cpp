@@ -143,6 +143,37 @@ TEST(Rings, DoNotGoAlongTheEndOfTheTravel) {
     }
 }
 
+// Where the strips before them end it is not known how much room there is around the cutter: the first ring
+// is gone to by a way that is free, around the box's corner or over it.
+TEST(Rings, TheFirstIsGoneToByAWayThatIsFree) {
+    Bench bench;
+    bench.clear(5);
+    PathBuilder path = bench.builder();
+    RingPlan plan;
+    plan.radius = 5;
+    plan.step = 9;
+    plan.z = to_units(5);
+    plan.strips = {line(25.1, 40, 25.1, 19, 5)};
+    RingPlan::Piece ring;
+    for (const auto& [x, y] : {std::pair{19.0, 25.1}, {10.0, 25.1}, {10.0, 32.0}, {19.0, 32.0}, {19.0, 25.1}})
+        ring.points.push_back({to_units(x), to_units(y), plan.z});
+    ring.box = {10 * kUnitsPerMm, 25.1 * kUnitsPerMm, 19 * kUnitsPerMm, 32 * kUnitsPerMm};
+    ring.closed = true;
+    plan.pieces = {ring};
+    clear_from_afar(path, bench.cut, plan);
+    const std::vector<Move>& moves = bench.operation.moves;
+    for (const PathPoint& p : ring.points)
+        EXPECT_TRUE(std::any_of(moves.begin(), moves.end(),
+                                [&](const Move& m) { return m.x == p.x && m.y == p.y && m.z == p.z; }));
+    for (std::size_t k = 1; k < moves.size(); ++k)
+        for (int part = 0; part <= 100; ++part) {
+            const double t = part / 100.0, x = to_mm(moves[k - 1].x) * (1 - t) + to_mm(moves[k].x) * t,
+                         y = to_mm(moves[k - 1].y) * (1 - t) + to_mm(moves[k].y) * t,
+                         z = to_mm(moves[k - 1].z) * (1 - t) + to_mm(moves[k].z) * t;
+            ASSERT_LE(bench.part.drop(x, y).tip_z, z + 1e-3) << "move " << k << " at " << x << ", " << y;
+        }
+}
+
 TEST(PlanView, NearALineIsWhatLiesWithinReachOfItsSegments) {
     const std::vector<PathPoint> line{{0, 0, 0}, {300, 400, 0}, {300, 400, 0}, {300, 1000, 0}};
     // 50 from the middle of the first segment, square to it: a fifth of (4, -3).

@@ -15,6 +15,7 @@
 #include "kernels/polygons/hull.h"
 #include "kernels/polygons/loops.h"
 #include "kernels/polygons/runs_inside.h"
+#include "kernels/polygons/thinned.h"
 
 namespace {
 
@@ -565,6 +566,41 @@ TEST(Polygons, RefusesWhatDoesNotFit) {
     EXPECT_TRUE(simplify(flat).empty());
     EXPECT_TRUE(offset(flat, 1, 0.01).empty());
     EXPECT_TRUE(offset(Loops{}, 1, 0.01).empty());
+}
+
+// Loops that are much wider than the tolerance keep their places, triangles too; those that are not vanish.
+TEST(Polygons, ThinnedLoopsLieWithinTheToleranceOfThoseGiven) {
+    std::mt19937_64 random(seed_of("ThinnedLoopsLieWithinTheToleranceOfThoseGiven"));
+    int left_out = 0;
+    for (int round = 0; round < 60; ++round) {
+        constexpr double mm = 0.05;
+        Loops loops;
+        for (int k = 0; k < 8; ++k) {
+            const int corners = 3 + static_cast<int>(random() % (k % 2 == 0 ? 2 : 60));
+            std::vector<Point2> points;
+            for (int i = 0; i < corners; ++i) {
+                const double turn = 2 * std::numbers::pi * i / corners,
+                             r = 20'000 * (0.5 + static_cast<double>(random() % 1000) / 1000);
+                points.push_back({static_cast<std::int32_t>(100'000 * k + r * std::cos(turn)),
+                                  static_cast<std::int32_t>(r * std::sin(turn))});
+            }
+            add(loops, points);
+        }
+        const Loops thin = thinned(loops, mm);
+        ASSERT_EQ(thin.size(), loops.size()) << round;
+        for (std::size_t i = 0; i < loops.size(); ++i) {
+            const Loops before = alone(loops, i), now = alone(thin, i);
+            for (const Point2 p : before.points)
+                EXPECT_LE(distance_to_boundary(now, p), mm * kUnitsPerMm + 1e-6) << round << " loop " << i;
+            for (const Point2 p : now.points) EXPECT_EQ(distance_to_boundary(before, p), 0);
+            left_out += static_cast<int>(before.points.size() - now.points.size());
+        }
+    }
+    EXPECT_GT(left_out, 100);
+    Loops slivers;
+    add(slivers, {{0, 0}, {100'000, 0}, {50'000, 400}});
+    add(slivers, {{0, 0}, {100, 0}, {100, 100}, {0, 100}});
+    EXPECT_TRUE(thinned(slivers, 0.05).empty());
 }
 
 // Of each line, every place lies in a run exactly when it lies in the region; runs end on its border.

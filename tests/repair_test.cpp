@@ -16,6 +16,8 @@
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/repair/bodies.h"
+#include "kernels/repair/duplicates.h"
+#include "kernels/repair/orient.h"
 #include "kernels/repair/rebuild.h"
 #include "kernels/repair/soup.h"
 #include "kernels/repair/t_junctions.h"
@@ -275,6 +277,74 @@ TEST(Repair, OfTheVerticesThatSplitEdgesTheFarthestIsTold) {
         EXPECT_EQ(soup.facets.size(), 4 * edges);
         EXPECT_NEAR(split.farthest_mm, farthest, 1e-9);
         EXPECT_EQ(split.where, where);
+    }
+}
+
+FacetSoup soup_of(const Mesh& mesh) {
+    FacetSoup soup;
+    soup.vertices.assign(mesh.vertices.begin(), mesh.vertices.end());
+    soup.facets.assign(mesh.facets.begin(), mesh.facets.end());
+    return soup;
+}
+
+TEST(Repair, FacetsGivenTwiceStayWhereTheyJoinBodiesOrAreAllThereIs) {
+    Context context({.threads = 1});
+    Random random(test::seed());
+    const Facets box = fine_box(2, {0, 0, 0}, {10, 10, 10}), beside = fine_box(2, {10, 0, 0}, {20, 10, 10});
+    Facets joined = box, twice = box;
+    shapes::append(joined, beside);
+    shapes::append(twice, box);
+    for (Facets* facets : {&joined, &twice}) {
+        std::shuffle(facets->begin(), facets->end(), random);
+        FacetSoup soup = soup_of(welded(*facets));
+        const std::size_t all = facets->size();
+        ASSERT_EQ(soup.facets.size(), all);
+        EXPECT_EQ(drop_duplicates(context, soup).count, 0u);
+        EXPECT_EQ(soup.facets.size(), all);
+    }
+    // Any facet that is there once more goes, one beside others as well, but for all of them.
+    for (int round = 0; round < 20; ++round) {
+        Facets some = box;
+        const std::size_t more = 1 + draw(random, box.size() / 2);
+        for (std::size_t i = 0; i < more; ++i) some.push_back(box[(i + 7) % box.size()]);
+        FacetSoup soup = soup_of(welded(some));
+        EXPECT_EQ(drop_duplicates(context, soup).count, more);
+        EXPECT_EQ(soup.facets.size(), box.size());
+    }
+}
+
+TEST(Repair, WhatIsTurnedIsCountedByFacetsAndPatches) {
+    Context context({.threads = 1});
+    Random random(test::seed());
+    const FacetSoup good = soup_of(welded(fine_box(4, {0, 0, 0}, {40, 40, 40})));
+    const std::size_t n = good.facets.size();
+    for (const std::size_t turned : {std::size_t{0}, std::size_t{1}, n / 20, n / 8, n / 3}) {
+        std::vector<std::size_t> order(n);
+        for (std::size_t f = 0; f < n; ++f) order[f] = f;
+        std::shuffle(order.begin(), order.end(), random);
+        order.resize(turned);
+        FacetSoup bad = good;
+        for (const std::size_t f : order) std::swap(bad.facets[f][1], bad.facets[f][2]);
+        // Patches: those that share two corners hang together.
+        std::vector<std::size_t> patch(turned);
+        for (std::size_t i = 0; i < turned; ++i) patch[i] = i;
+        for (std::size_t i = 0; i < turned; ++i)
+            for (std::size_t k = 0; k < i; ++k) {
+                int shared = 0;
+                for (const std::uint32_t v : good.facets[order[i]])
+                    for (const std::uint32_t w : good.facets[order[k]]) shared += v == w ? 1 : 0;
+                const std::size_t from = patch[i], to = patch[k];
+                if (shared == 2)
+                    for (std::size_t& p : patch) p = p == from ? to : p;
+            }
+        std::sort(patch.begin(), patch.end());
+        const auto patches =
+            static_cast<std::uint64_t>(std::unique(patch.begin(), patch.end()) - patch.begin());
+        const Turned found = orient(context, bad);
+        EXPECT_EQ(found.facets, turned);
+        EXPECT_EQ(found.patches, patches);
+        EXPECT_EQ(found.area_mm2 > 0, turned > 0);
+        EXPECT_TRUE(std::equal(bad.facets.begin(), bad.facets.end(), good.facets.begin()));
     }
 }
 

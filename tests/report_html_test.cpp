@@ -154,6 +154,33 @@ TEST(Replay, AStraightSlotIsAsDeepAndAsWideAsItIs) {
     EXPECT_THROW(Replay(context, input, {.cell = 0, .material = {}}), Error);
 }
 
+// Edges press on the wood however little they take: a cut's force grows with its feed from the least on. A
+// spindle at rest has none.
+TEST(Replay, EveryCutHasAForceHoweverSlowItIs) {
+    Context context;
+    const PatternMesh stl = read_pattern_mesh(context, kStl);
+    SimulationInput input;
+    input.mesh = stl.mesh.view();
+    input.stock_min = {-80, -80}, input.stock_max = {80, 80};
+    input.layers.push_back({0, 50, 50.5, {}});
+    input.tools = Job().tools;
+    const auto force = [&](double feed, double rpm) {
+        Program program;
+        program.tool = 2;
+        program.spindle_rpm = rpm;
+        for (const double x : {-100.0, 100.0}) program.steps.push_back({x, 70, 47.5, feed, 1, true});
+        Replay replay(context, input, {});
+        return replay.run(program).pieces.back().force_n;
+    };
+    double slower = 0;
+    for (const double feed : {0.5, 1.0, 30.0, 3000.0}) {
+        const double found = force(feed, 18000);
+        EXPECT_GT(found, slower) << feed;
+        slower = found;
+    }
+    EXPECT_EQ(force(3000, 0), 0);
+}
+
 TEST(Report, HoldsWhatLiesInTheFolder) {
     if (!reports_are_built()) {
         std::printf("skipped: the report was not built\n");

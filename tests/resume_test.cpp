@@ -1,5 +1,6 @@
 // A build killed after any step goes on from what lies on disk and ends the same; a spoilt layer is faced off
 // and made again, and the stack ends the same.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -415,6 +416,44 @@ TEST(ResumePoint, SaysWhatTheMachineIsFoundLike) {
     EXPECT_FALSE(p.glue_lost);
     p = point("unload", 2, 0);
     EXPECT_TRUE(says(p, "off the machine"));
+}
+
+// Heights in words are those in numbers, to a thousandth of a millimetre and without zeros at their end.
+TEST(ResumePoint, SaysItsHeightsInMillimetres) {
+    Job job;
+    job.machine.base_board_thickness = 18.1234;
+    const Plan plan = block(job, {3, 1, false});
+    const UnderWay build{stated(plan), read_sequence(sequence_json(plan))};
+    const auto written = [](double value) {
+        const auto thousandths = std::llround(value * 1000);
+        std::string text = fmt::format("{}{}.{:03d}", thousandths < 0 ? "-" : "",
+                                       std::abs(thousandths) / 1000, std::abs(thousandths) % 1000);
+        while (text.back() == '0') text.pop_back();
+        if (text.back() == '.') text.pop_back();
+        return text;
+    };
+    int told = 0, touched = 0;
+    for (std::size_t i = 1; i <= build.sequence.steps.size(); ++i) {
+        const ResumePoint p = resume_point(build.plan, build.sequence, state_after(build, i), 0);
+        for (const std::string& check : p.checks) {
+            if (check.find("the stack stands") == 0) {
+                EXPECT_EQ(
+                    check.find(fmt::format("the stack stands {} mm above the table, base board included, "
+                                           "to {} mm",
+                                           written(p.stack_mm), written(p.tolerance_mm))),
+                    0U)
+                    << check;
+                ++told;
+            }
+            if (check.find("the stack's top lies at") == std::string::npos) continue;
+            EXPECT_NE(check.find(fmt::format("lies at z = {} mm in the programs", written(*p.touch_off_mm))),
+                      std::string::npos)
+                << check;
+            ++touched;
+        }
+    }
+    EXPECT_GT(told, 10);
+    EXPECT_GT(touched, 10);
 }
 
 TEST(Progress, ATextThatIsNoneIsRefusedWithWhatIsWrong) {

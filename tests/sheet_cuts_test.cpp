@@ -1,10 +1,12 @@
 // Cuts of sheets against closed forms and against the sections that they must spare.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
 
+#include "engine/sheets/fitted_heights.h"
 #include "engine/sheets/sheet_cuts.h"
 #include "kernels/slicing/slicing.h"
 #include "tests/support/loft.h"
@@ -75,6 +77,51 @@ Cut cut(Context& context, const Mesh& mesh, double thickness, const SheetCutRule
     result.stairs = stairs_of(context, mesh.view(), result.spans, StairSide::outside);
     result.cuts = cuts_of(context, mesh.view(), result.spans, result.stairs, rules);
     return result;
+}
+
+// Besides the ends of even parts these are the heights of corners, and those just below level facets.
+TEST(SheetCuts, AreFittedAtCornersAndAtLevelFacets) {
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<float> height(0.01F, 17.99F);
+    const std::vector<SheetSpan> spans{{0, 9, 0}, {9, 18, 0}};
+    int level = 0, level_edges = 0;
+    for (int round = 0; round < 300; ++round) {
+        // Facets between a few heights, so that many have a level edge and some are level.
+        const std::array<float, 3> some{height(random), height(random), height(random)};
+        Mesh mesh;
+        std::vector<double> corners, below;
+        for (std::uint32_t f = 0; f < 4; ++f) {
+            std::array<float, 3> z{};
+            for (float& one : z) one = some[random() % some.size()];
+            for (const float one : z) {
+                mesh.vertices.push_back({height(random), height(random), one});
+                corners.push_back(one);
+            }
+            mesh.facets.push_back({3 * f, 3 * f + 1, 3 * f + 2});
+            const bool is_level = z[0] == z[1] && z[1] == z[2];
+            if (is_level) below.push_back(z[0] - 1e-3);
+            level += is_level ? 1 : 0;
+            level_edges += !is_level && (z[0] == z[1] || z[1] == z[2] || z[2] == z[0]) ? 1 : 0;
+        }
+        const auto found = heights_to_fit(mesh.view(), spans, 0);
+        ASSERT_EQ(found.size(), spans.size());
+        for (std::size_t i = 0; i < spans.size(); ++i) {
+            const auto within = [&](double z) { return z > spans[i].bottom && z < spans[i].top; };
+            const auto holds = [](const std::vector<double>& all, double z, double off) {
+                return std::any_of(all.begin(), all.end(), [&](double h) { return std::abs(h - z) <= off; });
+            };
+            std::vector<double> even;
+            for (int k = 0; k <= kCutSections; ++k) even.push_back(spans[i].bottom + 9.0 * k / kCutSections);
+            EXPECT_TRUE(std::is_sorted(found[i].begin(), found[i].end()));
+            for (const double h : found[i])
+                EXPECT_TRUE(holds(even, h, 1e-9) || holds(corners, h, 1e-9) || holds(below, h, 1e-9)) << h;
+            for (const double h : even) EXPECT_TRUE(holds(found[i], h, 1e-9)) << h;
+            for (const double h : corners) EXPECT_TRUE(!within(h) || holds(found[i], h, 1e-3)) << h;
+            for (const double h : below) EXPECT_TRUE(!within(h) || holds(found[i], h, 2.5e-4)) << h;
+        }
+    }
+    EXPECT_GT(level, 50);
+    EXPECT_GT(level_edges, 200);
 }
 
 TEST(SheetCuts, ConeIsCutInOnePassAtItsAngle) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/simulate/simulate.h"
+#include "engine/simulate/simulation_memory.h"
 #include "io/posts/gcode_reader.h"
 #include "kernels/errors.h"
 #include "tests/support/seed.h"
@@ -754,6 +755,60 @@ TEST(Simulate, TimeByTheSlowestAxis) {
     Program p, before;
     p.steps = {{0, 0, 0, 0, 1, true}}, before.steps = {{0, 100, -30, 0, 1, true}};
     EXPECT_NEAR(program_seconds(p, m, &before), 30 / 25.0 + 25 / 300.0 + 100 / 50.0 + 50 / 400.0, 1e-9);
+}
+
+// Of lists of programs in which each may come several times: what is called the same is so in every value and
+// comes in the same order, and of a list that is as it was nothing is other, anywhere.
+TEST(ProgramChanges, WhatStaysIsKnownAgain) {
+    std::mt19937 random(test::seed());
+    std::vector<Program> pool(3);
+    for (Program& program : pool)
+        for (int k = 0; k < 6; ++k)
+            program.steps.push_back({static_cast<double>(random() % 50), static_cast<double>(random() % 50),
+                                     10, 1000, static_cast<std::uint32_t>(k + 1), true});
+    const auto drawn = [&] {
+        std::vector<Program> programs;
+        for (int layer = 0; layer < 2; ++layer)
+            for (std::size_t n = 1 + random() % 4; n-- > 0;) {
+                programs.push_back(pool[random() % pool.size()]);
+                programs.back().layer = layer;
+            }
+        return programs;
+    };
+    const auto same = [](const Program& a, const Program& b) {
+        return a.layer == b.layer &&
+               std::equal(a.steps.begin(), a.steps.end(), b.steps.begin(), b.steps.end(),
+                          [](const ProgramStep& s, const ProgramStep& t) {
+                              return s.x == t.x && s.y == t.y && s.z == t.z;
+                          });
+    };
+    CellGrid grid;
+    grid.cell = 1, grid.nx = grid.ny = 50;
+    for (int round = 0; round < 200; ++round) {
+        const std::vector<Program> before = drawn(), now = drawn();
+        const ProgramChanges none(before, before), changes(before, now);
+        for (std::size_t i = 0; i < before.size(); ++i) {
+            EXPECT_TRUE(none.is_same(i)) << round << " program " << i;
+            EXPECT_EQ(none.before(i), i);
+        }
+        TileResult tile;
+        tile.programs.assign(before.size(), TileProgram{});
+        for (TileProgram& program : tile.programs) program.removed = 1;
+        EXPECT_FALSE(none.touch(grid, 1e3, tile));
+        std::optional<std::size_t> last;
+        for (std::size_t i = 0; i < now.size(); ++i) {
+            const std::optional<std::size_t> was = changes.before(i);
+            if (!was) continue;
+            EXPECT_TRUE(!last || *last < *was) << round;
+            last = was;
+            if (changes.is_same(i)) {
+                EXPECT_TRUE(same(before[*was], now[i])) << round << " program " << i;
+            }
+        }
+        if (same(before[0], now[0])) {
+            EXPECT_TRUE(changes.is_same(0)) << round;
+        }
+    }
 }
 
 TEST(Simulate, MapsCancelMemoryAndNonsense) {

@@ -610,5 +610,32 @@ TEST(UndersideFloors, BearWhatPlatesBear) {
     EXPECT_FALSE(floor_of(shapes::box({0, 0, 0}, {50, 90, 18}), layer, 0, {10, 0.5}));
 }
 
+// A roof that reaches out to any of the four sides bears the same, as far out and over as many lines.
+TEST(UndersideFloors, BearTheSameWhicheverWayTheyReach) {
+    std::mt19937 random(test::seed());
+    for (int round = 0; round < 12; ++round) {
+        // In whole lines of the grid, so that they lie alike over each.
+        const auto wide = static_cast<float>(30 + random() % 12) / 2,
+                   foot = static_cast<float>(10 + random() % 12) / 2,
+                   reach = static_cast<float>(24 + random() % 40) / 2;
+        const float t = 1 + static_cast<float>(random() % 8) / 8;
+        std::optional<LoadedFloor> first;
+        for (int turns = 0; turns < 4; ++turns) {
+            shapes::Facets facets = shapes::box({0, 0, 0}, {foot, wide, 18});
+            shapes::append(facets, shapes::box({0, 0, 18 - t}, {foot + reach, wide, 30}));
+            for (auto& facet : facets)
+                for (Vec3f& v : facet)
+                    for (int k = 0; k < turns; ++k) v = {-v.y, v.x, v.z};
+            const auto floor = floor_of(facets, {18, MilledFrom::both_sides, 0}, 0, {20, 0.3});
+            ASSERT_TRUE(floor) << round;
+            if (!first) first = floor;
+            EXPECT_NEAR(floor->reach_mm, reach, 2) << round << ", turned " << turns;
+            EXPECT_DOUBLE_EQ(floor->reach_mm, first->reach_mm) << round << ", turned " << turns;
+            EXPECT_NEAR(floor->press_mpa, first->press_mpa, 1e-3 * first->press_mpa) << round;
+            EXPECT_NEAR(floor->push_mpa, first->push_mpa, 1e-3 * first->push_mpa) << round;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace slabwright

@@ -16,9 +16,10 @@ namespace {
 /// The fastest feed of a move that travels in the plane; plunges drill, and are slower than they are heavy.
 double fastest_feed(const Operation& operation) {
     std::uint32_t feed = 0;
-    for (std::size_t i = 1; i < operation.moves.size(); ++i) {
-        const Move &from = operation.moves[i - 1], &to = operation.moves[i];
-        if (from.x != to.x || from.y != to.y) feed = std::max(feed, to.feed);
+    const Move* from = nullptr;
+    for (const Move& to : operation.moves) {
+        if (from != nullptr && (from->x != to.x || from->y != to.y)) feed = std::max(feed, to.feed);
+        from = &to;
     }
     return feed;
 }
