@@ -470,6 +470,18 @@ TEST(CutList, ASlabLargerThanABoardIsRefused) {
     }
 }
 
+TEST(CutList, BoardsAreToldByTheirThickness) {
+    CutList list;
+    EXPECT_EQ(boards_text(list), "");
+    for (const double thickness : {12.5, 19.0, 19.0, 25.0}) {
+        list.boards.emplace_back().thickness = thickness;
+        list.boards.back().size = {2440, 1220};
+    }
+    EXPECT_EQ(
+        boards_text(list),
+        "1 board of 12.5 x 2440 x 1220 mm, 2 boards of 19 x 2440 x 1220 mm, 1 board of 25 x 2440 x 1220 mm");
+}
+
 TEST(CutList, ReckonsWithStatedPricesOnly) {
     Job job;
     job.slabs.length = job.slabs.width = 1000;

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "io/write/draw_json.h"
+#include "io/write/draw_ply.h"
 #include "io/write/report_draw.h"
 #include "kernels/access/wall_thickness.h"
 #include "kernels/errors.h"
@@ -178,6 +179,30 @@ TEST(Draw, APictureOfFewerFacetsHasItsCodes) {
                                 {at(20, 19, 20), at(40, 19, 20), at(30, 19, 30)},
                                 {at(2, 2, 39), at(5, 8, 39), at(8, 2, 39)}});
     EXPECT_EQ(draw_codes(context, mesh.view(), report, picture.view()), std::string({1, 0, 3, 2}));
+}
+
+TEST(Draw, AMapPaintsWhatIsFoundOfEachFacet) {
+    const Mesh mesh = solid(shapes::box({0, 0, 0}, {10, 10, 10}));
+    DrawReport report;
+    report.draft_deg.assign(mesh.facets.size(), 90);
+    report.finding.assign(mesh.facets.size(), DrawFinding::none);
+    report.thickness_mm.assign(mesh.facets.size(), 0);
+    report.thickness_mm[1] = 0.2F;  // thin as foil
+    report.thickness_mm[2] = 3;
+    report.finding[2] = report.finding[3] = DrawFinding::little_draft;
+    report.thickness_mm[4] = 0.2F;
+    report.finding[4] = DrawFinding::undercut;
+    const std::string map = draw_ply(mesh.view(), report, "a box");
+    constexpr std::size_t bytes = 1 + 3 * 4 + 2 * 4 + 3;  // of a face
+    std::string painted;
+    for (std::size_t f = 0; f < mesh.facets.size(); ++f) {
+        const std::size_t end = map.size() - (mesh.facets.size() - 1 - f) * bytes;
+        const auto part = [&](std::size_t k) { return static_cast<unsigned char>(map[end - 3 + k]); };
+        if (part(0) == part(1) && part(1) == part(2)) painted += 'g';            // grey
+        else if (part(2) > part(0) && part(2) > part(1)) painted += 'b';         // blue
+        else painted += part(1) > part(0) / 2 && part(1) > part(2) ? 'y' : 'v';  // yellow, vermilion
+    }
+    EXPECT_EQ(painted, "gbbyvggggggg");
 }
 
 TEST(Draw, AReportPassesOverThinWallsWhereMemoryEnds) {

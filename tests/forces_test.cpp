@@ -2,6 +2,7 @@
 // both, seams between teeth, ranges, the overhang and the deflection of a cutter.
 #include <gtest/gtest.h>
 #include <pthread.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -9,7 +10,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <limits>
+#include <map>
 #include <random>
 #include <string>
 #include <system_error>
@@ -410,6 +413,41 @@ TEST(ForceSolver, StreamsAnyNumberInOrder) {
     solver.solve(all, {}, {});
 }
 
+/// Seconds of the processor that each thread of this process has had, as the system tells them; nothing where
+/// it tells none.
+std::map<std::string, double> seconds_by_thread() {
+    std::map<std::string, double> seconds;
+    std::error_code none;
+    for (std::filesystem::directory_iterator at("/proc/self/task", none), end; !none && at != end;
+         at.increment(none)) {
+        std::ifstream file(at->path() / "schedstat");
+        if (double ns = 0; file >> ns) seconds[at->path().filename().string()] = ns * 1e-9;
+    }
+    return seconds;
+}
+
+// A device that is the processor would take all of its cores.
+TEST(ForceSolver, ADeviceTakesNoMoreCoresThanTheContextHasThreads) {
+    std::mt19937_64 random(test::seed());
+    std::vector<CutSegment> cuts(4000);
+    for (CutSegment& cut : cuts) cut = random_cut(random, CutterForm::ball);
+    std::vector<SegmentForces> found(cuts.size());
+    Context one({.threads = 1});
+    ForceSolver solver(one);
+    solver.solve(one, cuts, found);  // whatever is yet to be compiled
+    const std::map<std::string, double> before = seconds_by_thread();
+    solver.solve(one, cuts, found, 1e-7);
+    std::vector<double> busy{0, 0};
+    for (const auto& [thread, seconds] : seconds_by_thread()) {
+        const auto known = before.find(thread);
+        if (thread != std::to_string(gettid()))
+            busy.push_back(seconds - (known == before.end() ? 0 : known->second));
+    }
+    std::sort(busy.rbegin(), busy.rend());
+    std::printf("the busiest of the device's threads took %.3f s, the next %.3f s\n", busy[0], busy[1]);
+    EXPECT_LE(busy[1], 0.002 + 0.1 * busy[0]) << solver.device();
+}
+
 TEST(ForceSolver, NamesTheBadSegmentAndCanBeCancelled) {
     Context context;
     ForceSolver solver(context);
@@ -487,6 +525,36 @@ TEST(HardestCuts, AreTheSameWithADeviceAndWithout) {
         if (starts[g] == starts[g + 1]) EXPECT_EQ(with.groups[g].across, kNoCut);
         else EXPECT_NEAR(reference_forces(cuts[with.groups[g].across]).peak_y_n, most, 1e-9 * most);
     }
+}
+
+// Cuts of different geometry whose peaks differ by less than a device can tell, each the hardest of its group
+// by the device's errors as likely as not.
+TEST(HardestCuts, AreNotADevicesChoiceAmongEquals) {
+    const unsigned seed = test::seed();
+    std::mt19937_64 random(seed);
+    std::vector<CutSegment> cuts;
+    std::vector<std::size_t> starts{0};
+    for (int g = 0; g < 40; ++g) {
+        for (int i = 0; i < 8; ++i) {
+            CutSegment cut = random_cut(random, CutterForm::flat);
+            // Forces are proportional to the coefficients, all of them together.
+            const double scale =
+                100 * (1 - drawn(random, 0, 1e-7)) / closed_form_forces(cut).peak_resultant_n;
+            for (double* k : {&cut.coefficients.ktc, &cut.coefficients.krc, &cut.coefficients.kac,
+                              &cut.coefficients.kte, &cut.coefficients.kre, &cut.coefficients.kae})
+                *k *= scale;
+            cuts.push_back(cut);
+        }
+        starts.push_back(cuts.size());
+    }
+    Context context;
+    ForceSolver solver(context);
+    if (!solver.on_device()) std::printf("no device to be doubted: %s\n", solver.note().c_str());
+    const HardestSearch with = hardest_cuts(context, cuts, starts, &solver),
+                        without = hardest_cuts(context, cuts, starts, nullptr);
+    ASSERT_EQ(with.groups.size(), without.groups.size());
+    for (std::size_t g = 0; g < with.groups.size(); ++g)
+        EXPECT_EQ(with.groups[g].all(), without.groups[g].all()) << "group " << g;
 }
 
 TEST(SolverAhead, OpensOneWhenAllThatIsExpectedIsWorthIt) {

@@ -16,6 +16,7 @@
 
 #include "io/read/mesh_format.h"
 #include "io/read/pattern_mesh.h"
+#include "io/read/polygon_facets.h"
 #include "io/slabwright.h"
 #include "kernels/errors.h"
 #include "tests/support/closed_mesh.h"
@@ -388,6 +389,30 @@ TEST(MeshFormats, PolygonsOfAnyOutlineBecomeTheirFacets) {
     }
 }
 
+// A file in metres has polygons of less than a unit's area.
+TEST(MeshFormats, PolygonsAreCutAlikeAtAnySize) {
+    std::mt19937_64 random(test::seed());
+    std::uniform_real_distribution<double> radius(5, 30);
+    for (int round = 0; round < 200; ++round) {
+        const std::size_t n = 4 + random() % 20, up = random() % 3;
+        const double side = random() % 2 ? 1 : -1;
+        std::vector<FileVertex> large(n), small(n);
+        std::vector<std::uint32_t> corners(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            const double a = side * 2 * 3.14159265358979 * static_cast<double>(i) / static_cast<double>(n),
+                         r = radius(random);
+            large[i][(up + 1) % 3] = r * std::cos(a);
+            large[i][(up + 2) % 3] = r * std::sin(a);
+            for (std::size_t k = 0; k < 3; ++k) small[i][k] = std::ldexp(large[i][k], -10);
+            corners[i] = static_cast<std::uint32_t>(i);
+        }
+        std::vector<Index3> of_large, of_small;
+        append_polygon(corners, large, of_large);
+        append_polygon(corners, small, of_small);
+        EXPECT_EQ(of_large, of_small) << "round " << round;
+    }
+}
+
 std::string refusal(Context& context, const Named& file) {
     try {
         (void)read(context, file);
@@ -460,6 +485,24 @@ TEST(MeshFormats, BadInputIsOneLineWithItsPlace) {
             "ENDSEC;\nEND-ISO-10303-21;\n";
         EXPECT_EQ(refusal(context, {"x.step", drawing}), "step.no_facets x.step");
     }
+}
+
+TEST(MeshFormats, APlyWithoutFacetsTellsWhetherItAnnouncesThem) {
+    Context context;
+    const auto message = [&](const std::string& elements) -> std::string {
+        try {
+            (void)read(context, {"x.ply",
+                                 "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                                 "property float y\nproperty float z\n" +
+                                     elements + "end_header\n0 0 0\n"});
+        } catch (const Error& error) {
+            return error.code() + ": " + error.message();
+        }
+        return "";
+    };
+    EXPECT_EQ(message(""), "ply.no_facets: the header announces no element 'face'");
+    EXPECT_EQ(message("element face 0\nproperty list uchar int vertex_indices\n"),
+              "ply.no_facets: the file holds no facets");
 }
 
 // The process that reads STEP is forked with what its parent has not yet written.

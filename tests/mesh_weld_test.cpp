@@ -280,6 +280,28 @@ TEST(MeshWeld, MemoryThatIsKeptIsUsedAgain) {
     release_bulk(outside, large);
 }
 
+// Pieces from the heap, one beside the other once the heap has grown, and small ones between them: as large
+// as whole pages, or some bytes more or less, so that nothing is left behind them.
+TEST(MeshWeld, LargePiecesHoldEveryByteTheyWereAskedFor) {
+    std::mt19937_64 random(test::seed());
+    for (int round = 0; round < 4; ++round) {
+        std::vector<std::pair<unsigned char*, std::size_t>> pieces;
+        for (std::size_t i = 0; i < 6; ++i) {
+            std::size_t bytes = 1000 + random() % 100000;
+            if (i % 2 == 0) bytes = ((3 + random() % 4) << 21) - 64 + random() % 3 * 64;
+            pieces.emplace_back(static_cast<unsigned char*>(take_bulk(bytes)), bytes);
+            std::fill_n(pieces.back().first, bytes, static_cast<unsigned char>(i));
+        }
+        for (std::size_t i = 0; i < pieces.size(); ++i) {
+            const auto [data, bytes] = pieces[i];
+            EXPECT_EQ(std::count(data, data + bytes, static_cast<unsigned char>(i)),
+                      static_cast<std::ptrdiff_t>(bytes))
+                << "round " << round;
+        }
+        for (const auto& [data, bytes] : pieces) release_bulk(data, bytes);
+    }
+}
+
 // The flags of the mapping that an address lies in, as the system tells them; nothing where it tells none.
 std::string flags_of(const void* address) {
     std::ifstream maps("/proc/self/smaps");

@@ -2,6 +2,7 @@
 // closed form.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "engine/simulate/reach.h"
+#include "io/write/report_reach.h"
 #include "kernels/mesh/mesh.h"
 #include "tests/support/seed.h"
 
@@ -220,4 +222,53 @@ TEST(Reach, HolderFloorAndBoard) {
     Reach flat(part, {tool(ToolKind::flat, 6)}, 2, 42, -1e9);
     EXPECT_FALSE(flat.reachable({15, 25, 1.9})) << "flat end mills stop at the layer's bottom";
     EXPECT_TRUE(flat.reachable({15, 25, 2}));
+}
+
+// Small facets anywhere about walls with a wide pocket and a slot too narrow for any tool between them.
+TEST(ReachMap, EveryFacetIsAskedAtItsMiddle) {
+    Solid solid;
+    solid.box({0, 0, 0}, {60, 40, 10});
+    for (const auto& [from, to] : {std::array{0.0, 5.0}, {20, 30}, {32, 60}})
+        solid.box({from, 0, 5}, {to, 40, 30});
+    Context context;
+    const StandingPart part(context, solid.mesh.view());
+    SimulationInput input;
+    input.layers.push_back({0, 30, 31});
+    input.tools = {tool(ToolKind::flat, 8), tool(ToolKind::ball, 6)};
+    constexpr double board = 1;
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> unit(0, 1);
+    const auto near = [&](const Point3& p) {
+        return Point3{p[0] + unit(random), p[1] + unit(random), p[2] + unit(random)};
+    };
+    Solid picture;
+    for (int i = 0; i < 150; ++i) {
+        const Point3 at{64 * unit(random) - 2, 38 * unit(random) + 1, 28 * unit(random) + 3};
+        picture.triangle(near(at), near(at), near(at));
+    }
+    const ReachMap map = reach_map(context, part, input, board, picture.mesh.view());
+    ASSERT_EQ(map.codes.size(), picture.mesh.facets.size());
+    Reach reach(part, input.tools, 0, 30, -board);
+    std::array<int, 3> count{};
+    for (std::size_t f = 0; f < map.codes.size(); ++f) {
+        std::array<Point3, 3> p;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Vec3f& v = picture.mesh.vertices[picture.mesh.facets[f][k]];
+            p[k] = {v.x, v.y, v.z};
+        }
+        const auto along = [&](std::size_t corner, std::size_t k) { return p[corner][k] - p[0][k]; };
+        Point3 normal{};
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::size_t u = (k + 1) % 3, v = (k + 2) % 3;
+            normal[k] = along(1, u) * along(2, v) - along(1, v) * along(2, u);
+        }
+        const double length = std::hypot(normal[0], normal[1], normal[2]);
+        Point3 over{};
+        for (std::size_t k = 0; k < 3; ++k)
+            over[k] = (p[0][k] + p[1][k] + p[2][k]) / 3 + kReachDistance * normal[k] / length;
+        const int expected = normal[2] < 0 ? 0 : reach.reachable(over) ? 1 : 2;
+        EXPECT_EQ(map.codes[f], expected) << "at " << over[0] << ' ' << over[1] << ' ' << over[2];
+        ++count.at(static_cast<std::size_t>(expected));
+    }
+    for (const int of : count) EXPECT_GT(of, 10);
 }

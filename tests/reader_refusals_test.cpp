@@ -259,6 +259,13 @@ TEST(ReaderRefusals, Sequences) {
     EXPECT_EQ(read(good), "");
     EXPECT_EQ(read(replaced(good, "\"seconds\":1", "\"seconds\":\"1\"")),
               "verify.sequence sequence.json: steps[0].seconds is no number");
+    const auto bead = [&](const std::string& of) {
+        return read(replaced(good, "\"glue\":[]", R"("glue":[{"layer":1,"loops":[],"beads":[)" + of + "]}]"));
+    };
+    EXPECT_EQ(bead("[1,2,3]"), "");
+    for (const char* none : {"[1,2]", "[1,2,3,4]", "5", R"({"x":1,"y":2,"r":3})"})
+        EXPECT_EQ(bead(none), "verify.sequence sequence.json: glue[0].beads has one that is no three numbers")
+            << none;
     // Zeros that nobody reads take no memory.
     const std::size_t size = kLargestSequence + 1;
     const std::unique_ptr<char, decltype(&std::free)> zeros(static_cast<char*>(std::calloc(size, 1)),

@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
@@ -14,6 +17,7 @@
 #include "io/sheets_html.h"
 #include "io/slabwright.h"
 #include "io/text/base64.h"
+#include "io/write/report_outlines.h"
 #include "io/write/thinned_path.h"
 #include "kernels/access/standing_part.h"
 #include "tests/support/files.h"
@@ -95,6 +99,41 @@ TEST(ThinnedPath, EveryPointLeftOutLiesNearTheWayThatReplacesIt) {
             ASSERT_LE(std::hypot(p.x - a.x - t * ux, p.y - a.y - t * uy, p.z - a.z - t * uz),
                       tolerance + 1e-9)
                 << k;
+        }
+    }
+}
+
+TEST(ReportOutlines, EveryPointLeftOutLiesNearTheOutline) {
+    std::mt19937_64 random(test::seed());
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (int round = 0; round < 50; ++round) {
+        const std::size_t n = 3 + random() % 400;
+        const double waves = 1 + 8 * unit(random), begin = 6 * unit(random), deep = 10 * unit(random);
+        std::vector<Point2> loop;
+        for (std::size_t i = 0; i < n; ++i) {
+            const double a = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n),
+                         r = 60 + deep * std::sin(waves * a + begin) + 0.02 * unit(random);
+            loop.push_back({to_units(r * std::cos(a)), to_units(0.7 * r * std::sin(a))});
+        }
+        const std::vector<std::int64_t> drawn = outline(loop);
+        ASSERT_EQ(drawn.size() % 2, 0u);
+        ASSERT_LE(drawn.size(), 2 * n);
+        const std::size_t corners = drawn.size() / 2;
+        const auto at = [&](std::size_t k) {
+            const std::size_t c = k % corners;
+            return std::array<double, 2>{static_cast<double>(drawn[2 * c]) / kHundredths,
+                                         static_cast<double>(drawn[2 * c + 1]) / kHundredths};
+        };
+        for (const Point2 p : loop) {
+            double nearest = std::numeric_limits<double>::infinity();
+            for (std::size_t k = 0; k < corners; ++k) {
+                const std::array<double, 2> a = at(k), b = at(k + 1);
+                const double ux = b[0] - a[0], uy = b[1] - a[1], wx = to_mm(p.x) - a[0],
+                             wy = to_mm(p.y) - a[1], uu = ux * ux + uy * uy,
+                             t = uu > 0 ? std::clamp((wx * ux + wy * uy) / uu, 0.0, 1.0) : 0;
+                nearest = std::min(nearest, std::hypot(wx - t * ux, wy - t * uy));
+            }
+            ASSERT_LE(nearest, kOutlineTolerance + 1 / kHundredths) << "round " << round;
         }
     }
 }

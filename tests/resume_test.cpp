@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <set>
@@ -19,6 +20,7 @@
 #include "io/posts/gcode_reader.h"
 #include "io/posts/gcode_writer.h"
 #include "io/read/sequence_reader.h"
+#include "io/resume.h"
 #include "io/text/progress_json.h"
 #include "io/write/sequence_json.h"
 #include "kernels/errors.h"
@@ -454,6 +456,48 @@ TEST(ResumePoint, SaysItsHeightsInMillimetres) {
     }
     EXPECT_GT(told, 10);
     EXPECT_GT(touched, 10);
+}
+
+// Whoever measures the stack by a program reads these numbers, not the words.
+TEST(ResumePoint, IsWrittenForProgramsAsItIs) {
+    Job job;
+    job.machine.magazine = 2;
+    const Plan plan = block(job, {2, 1, false});
+    const UnderWay build{stated(plan), read_sequence(sequence_json(plan))};
+    for (std::size_t i = 0; i <= build.sequence.steps.size(); ++i) {
+        const auto p =
+            std::make_shared<ResumePoint>(resume_point(build.plan, build.sequence, state_after(build, i), 0));
+        ResumeStatus status;
+        status.sequence = "sequence.json";
+        status.after = static_cast<int>(i);
+        status.point = p;
+        status.steps = build.sequence.steps;
+        const auto document = nlohmann::json::parse(resume_json(status));
+        const auto& machine = document.at("machine");
+        for (const auto& [key, value] : {std::pair{"bonded_mm", p->bonded_mm},
+                                         {"stack_mm", p->stack_mm},
+                                         {"tolerance_mm", p->tolerance_mm},
+                                         {"load_kg", p->load_kg}})
+            EXPECT_NEAR(machine.at(key).get<double>(), value, 1e-3) << key << " after " << i << " steps";
+        for (const auto& [key, value] : {std::pair{"table_height_mm", p->table_mm},
+                                         {"work_offset_z_mm", p->work_offset_mm},
+                                         {"touch_off_mm", p->touch_off_mm},
+                                         {"spindle_nose_mm", p->nose_mm}}) {
+            ASSERT_EQ(machine.at(key).is_null(), !value) << key << " after " << i << " steps";
+            if (!value) continue;
+            EXPECT_NEAR(machine.at(key).get<double>(), *value, 1e-4) << key;
+        }
+        for (const auto& [key, value] : {std::pair{"layer", p->layer},
+                                         {"slabs", p->slabs},
+                                         {"feed_slabs", p->in_feed},
+                                         {"tool", p->tool}})
+            EXPECT_EQ(machine.at(key), value) << key << " after " << i << " steps";
+        EXPECT_EQ(machine.at("magazine"), p->magazine);
+        EXPECT_EQ(machine.at("faced"), p->faced);
+        EXPECT_EQ(machine.at("in_hand"), p->in_hand);
+        EXPECT_EQ(document.at("left").size(), build.sequence.steps.size() - i);
+        EXPECT_EQ(document.at("checks"), p->checks);
+    }
 }
 
 TEST(Progress, ATextThatIsNoneIsRefusedWithWhatIsWrong) {

@@ -10,12 +10,15 @@
 #include "engine/sheet_proof/sheet_proof.h"
 #include "engine/sheets/sheet_plan.h"
 #include "io/posts/sheet_reader.h"
+#include "io/sheets.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/loft.h"
+#include "tests/support/places.h"
 #include "tests/support/rs274.h"
 #include "tests/support/seed.h"
 #include "tests/support/sheet_proofs.h"
+#include "tests/support/temporary_folder.h"
 
 namespace slabwright {
 namespace {
@@ -49,6 +52,19 @@ TEST(Sheets, ProgramsOfEveryHeadMakeThePart) {
             EXPECT_LT(proof.left_over, 0.4 * upright);
         }
     }
+}
+
+TEST(Sheets, NothingIsDrawnOrComparedThatWasNotAskedFor) {
+    Context context;
+    const TemporaryFolder folder;
+    SheetJob job = job_of(SheetHead::laser);
+    job.slicing.thicknesses = {12};
+    const SheetsResult made =
+        make_sheets(context, checkout("tests/data/half-sphere.stl"), {}, job, folder / "out", {});
+    EXPECT_TRUE(made.proof.passed) << told(made.proof);
+    EXPECT_EQ(made.costs.size(), 1u);
+    for (const auto& [name, bytes] : tree(folder / "out"))
+        EXPECT_EQ(name.find("fixture"), std::string::npos) << name;
 }
 
 // Every kind of fault in the text is found in the text.

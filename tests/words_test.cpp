@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "io/text/nearest_word.h"
+
 namespace slabwright {
 namespace {
 
@@ -47,6 +49,13 @@ TEST(Words, LinesEndAsAnySystemEndsThem) {
     EXPECT_EQ(line_of(text, 5), 3u);
     EXPECT_EQ(line_of(text, 7), 4u);
     EXPECT_EQ(line_of("a\r", 2), 2u);
+}
+
+TEST(NearestWord, IsTheFirstOfThoseThatAreAsNear) {
+    EXPECT_EQ(nearest_word("depth", {}), "");
+    EXPECT_EQ(nearest_word("stepover", {"step_down", "step_over", "stepovers"}), "step_over");
+    EXPECT_EQ(nearest_word("cats", {"cuts", "hats", "cat", "dog"}), "cuts");
+    EXPECT_EQ(nearest_word("FANUC", {"haas", "fanuc"}), "fanuc");
 }
 
 }  // namespace
