@@ -203,6 +203,7 @@ RestPlace RestPlaces::slide(const Place& from) const {
                 break;
             }
             if (tip + under_ < cut_.layer.floor_below) break;
+            if (std::hypot(to_mm(x - from.x), to_mm(y - from.y)) > 2 * r_) return {};
         }
     return place(x, y, met);
 }

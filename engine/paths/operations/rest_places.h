@@ -65,7 +65,8 @@ protected:
     /// may do without.
     [[nodiscard]] bool too_steep(const Place& a, const Place& b) const;
 
-    /// Where the cutter ends that slides down from a place until it rests on all sides.
+    /// Where the cutter ends that slides down from a place until it rests on all sides; nowhere if that is
+    /// farther off than it is wide, for what is left there is near places of its own.
     [[nodiscard]] Place slide(const Place& from) const;
 
     const LayerCut& cut_;
