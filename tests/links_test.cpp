@@ -474,4 +474,9 @@ TEST(Leads, AreTangentFreeAndOverlapClosedRuns) {
     // The other way round the box is on the left, and there is no room for an arc.
     std::vector<PathPoint> wrong(bare.rbegin(), bare.rend());
     EXPECT_FALSE(add_leads(path, bench.cut, bench.part, 0.4, wrong));
+    // Unless it is known to be there: then the arcs are on the right.
+    std::vector<PathPoint> reversed(bare.rbegin(), bare.rend());
+    ASSERT_TRUE(add_leads(path, bench.cut, bench.part, 0.4, reversed, PartSide::left));
+    EXPECT_EQ(reversed.front(), (PathPoint{to_units(-7), to_units(7), to_units(5)}));
+    EXPECT_EQ(reversed.back(), (PathPoint{to_units(-7), to_units(2), to_units(5)}));
 }

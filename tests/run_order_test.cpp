@@ -91,7 +91,7 @@ TEST(LevelOrder, NothingIsCutUnderWhatStillStandsBesideIt) {
     const Tool tool = hills.flat(6);
     const DropIndex part(hills.cut.solid, flat_cutter(3));
     std::uniform_real_distribution<double> at(-200, 200), by(-9, 9);
-    for (int round = 0; round < 5; ++round) {
+    for (int round = 0; round < 6; ++round) {
         std::vector<std::vector<LevelRun>> levels(8);
         std::vector<std::pair<std::size_t, std::vector<PathPoint>>> all;
         for (std::size_t l = 0; l < levels.size(); ++l)
@@ -106,7 +106,8 @@ TEST(LevelOrder, NothingIsCutUnderWhatStillStandsBesideIt) {
             }
         Operation op;
         PathBuilder path(op, tool, 3000, kTop + 10, kTop + 2);
-        cut_levels(path, hills.cut, tool, part, levels, false);
+        cut_levels(path, hills.cut, tool, part, levels, false,
+                   round % 2 == 0 ? LevelWays::climbing : LevelWays::either);
         path.finish();
         std::vector<std::size_t> cut_at;
         for (const auto& each : all) {
@@ -149,12 +150,48 @@ TEST(LevelOrder, PitsAreCutOneAfterTheOther) {
     }
     Operation op;
     PathBuilder path(op, tool, 3000, kTop + 10, kTop + 2);
-    cut_levels(path, hills.cut, tool, part, levels, false);
+    cut_levels(path, hills.cut, tool, part, levels, false, LevelWays::climbing);
     path.finish();
     int crossings = 0;
     for (std::size_t k = 1; k < op.moves.size(); ++k)
         crossings += (op.moves[k - 1].x < 0) != (op.moves[k].x < 0);
     EXPECT_EQ(crossings, 2) << "the groove, and back to the other pit";
+}
+
+// A slope that is cut climbing is gone back over after each level; to and fro the next level begins where the
+// last has ended. Whichever way, each run is cut once, from end to end.
+TEST(LevelOrder, OpenRunsOfASlopeAreCutToAndFroWhereTheyNeedNotClimb) {
+    const Hills hills([](double, double) { return 1.0; });
+    const Tool tool = hills.flat(6);
+    const DropIndex part(hills.cut.solid, flat_cutter(3));
+    for (const LevelWays ways : {LevelWays::climbing, LevelWays::either}) {
+        std::vector<std::vector<LevelRun>> levels(10);
+        for (std::size_t l = 0; l < levels.size(); ++l) {
+            const std::int32_t y = to_units(-1 + 0.2 * static_cast<double>(l)),
+                               z = to_units(12 - static_cast<double>(l));
+            levels[l].push_back({{{to_units(-50), y, z}, {0, y, z}, {to_units(50), y, z}}, false});
+        }
+        Operation op;
+        PathBuilder path(op, tool, 3000, kTop + 10, kTop + 2);
+        cut_levels(path, hills.cut, tool, part, levels, false, ways);
+        path.finish();
+        double over = 0, cut = 0, backwards = 0;
+        bool has_cut = false;
+        for (std::size_t k = 1; k < op.moves.size(); ++k) {
+            const Move &a = op.moves[k - 1], &b = op.moves[k];
+            const double way = std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y));
+            if (b.feed == 0) over += has_cut ? way : 0;
+            else if (a.z == b.z) cut += way, has_cut = true, backwards += b.x < a.x ? way : 0;
+        }
+        EXPECT_NEAR(cut, 1000, 1e-6);
+        if (ways == LevelWays::climbing) {
+            EXPECT_GT(over, 900);
+            EXPECT_EQ(backwards, 0);
+        } else {
+            EXPECT_LT(over, 5);
+            EXPECT_NEAR(backwards, 500, 1e-6) << "every other run";
+        }
+    }
 }
 
 TEST(Chains, AFlatGoesToTheNextRunOnOneSlopeOrInOneHop) {

@@ -93,7 +93,7 @@ Operation finish_floors(const LayerCut& cut) {
         std::vector<std::vector<LevelRun>> feet;
         append_foot_runs(cut, tool, heights[i], grid, {}, feet);
         if (!feet.empty()) op.stepdown = std::max(op.stepdown, foot_heights(cut, heights[i]).back());
-        cut_levels(path, cut, tool, part, feet, true);
+        cut_levels(path, cut, tool, part, feet, true, LevelWays::climbing);
     }
     path.finish();
     return op;

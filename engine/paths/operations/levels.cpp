@@ -95,7 +95,7 @@ Operation finish_walls(const LayerCut& cut) {
                               runs[i]);
         }
     if (sees_allowance(cut)) take_out_idle(cut, cutter, kWorthLeaving, runs);
-    cut_levels(path, cut, tool, part, runs, true);
+    cut_levels(path, cut, tool, part, runs, true, LevelWays::climbing);
     path.finish();
     return op;
 }
@@ -259,7 +259,7 @@ public:
         PathBuilder path(op_, tool_, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed),
                          cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
         path.set_surroundings(cut_.around(tool_, &part));
-        cut_levels(path, cut_, tool_, part, runs, true);
+        cut_levels(path, cut_, tool_, part, runs, true, LevelWays::either);
         path.finish();
         return std::move(op_);
     }

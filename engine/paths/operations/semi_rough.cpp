@@ -568,7 +568,7 @@ private:
                          cut_.layer.z_top + 2);
         const DropIndex& part = cut_.drops(ball_ ? ball_cutter(r_ + pass_.allowance) : flat_cutter(r_));
         path.set_surroundings(cut_.around(tool_, &part));
-        cut_levels(path, cut_, tool_, part, runs, false);
+        cut_levels(path, cut_, tool_, part, runs, false, ball_ ? LevelWays::either : LevelWays::climbing);
         path.finish();
     }
 

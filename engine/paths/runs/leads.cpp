@@ -47,8 +47,9 @@ std::optional<std::vector<PathPoint>> quarter(PathBuilder& path, const LayerCut&
 }  // namespace
 
 bool add_leads(PathBuilder& path, const LayerCut& cut, const DropIndex& part, double chord,
-               std::vector<PathPoint>& run) {
+               std::vector<PathPoint>& run, PartSide side) {
     if (run.size() < 2) return false;
+    const double free_side = side == PartSide::right ? 1 : -1;  // 1: the left
     // The direction over a stretch of the run, not over its first chord, which may be of any length.
     auto direction = [&](bool at_end, double& tx, double& ty) {
         const PathPoint from = at_end ? run.back() : run.front();
@@ -88,10 +89,10 @@ bool add_leads(PathBuilder& path, const LayerCut& cut, const DropIndex& part, do
     }
     double ex = 0, ey = 0;
     if (direction(true, ex, ey))
-        if (auto out = quarter(path, cut, part, chord, run.back(), ex, ey, -1))
+        if (auto out = quarter(path, cut, part, chord, run.back(), ex, ey, -free_side))
             run.insert(run.end(), out->rbegin(), out->rend());
     if (!has_start) return false;
-    const auto in = quarter(path, cut, part, chord, run.front(), tx, ty, 1);
+    const auto in = quarter(path, cut, part, chord, run.front(), tx, ty, free_side);
     if (in) run.insert(run.begin(), in->begin(), in->end());
     return in.has_value();
 }

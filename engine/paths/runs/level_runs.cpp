@@ -90,12 +90,17 @@ private:
     std::vector<std::uint32_t> starts_, lower_;  // by run, those that wait for it
 };
 
-// Where a run may begin: an open one, which has the part on its right, at its first point, a closed one at
-// points all around it.
-void append_beginnings(const LevelRun& run, std::uint32_t id, std::vector<Beginning>& beginnings) {
+constexpr std::uint32_t kBackwards = 1;  // the place of an open run's beginning at its last point
+
+// Where a run may begin: an open one at its first point, from which on it has the part on its right, or at
+// either end, a closed one at points all around it.
+void append_beginnings(const LevelRun& run, LevelWays ways, std::uint32_t id,
+                       std::vector<Beginning>& beginnings) {
     const std::vector<PathPoint>& points = run.points;
     if (!run.closed) {
-        beginnings.push_back({{points[0].x, points[0].y}, {points.back().x, points.back().y}, id, 0});
+        const Point2 first{points[0].x, points[0].y}, last{points.back().x, points.back().y};
+        beginnings.push_back({first, last, id, 0});
+        if (ways == LevelWays::either) beginnings.push_back({last, first, id, kBackwards});
         return;
     }
     double since = kUnbounded;
@@ -115,7 +120,9 @@ void cut_run(PathBuilder& path, const LayerCut& cut, const DropIndex& part, doub
              const LevelRun& run, std::size_t place) {
     std::vector<PathPoint> points = run.points;
     if (!run.closed) {
-        if (leads) add_leads(path, cut, part, chord, points);
+        const bool backwards = place == kBackwards;
+        if (backwards) std::reverse(points.begin(), points.end());
+        if (leads) add_leads(path, cut, part, chord, points, backwards ? PartSide::left : PartSide::right);
     } else {
         // Where there is no room for an arc, perhaps elsewhere around the contour.
         constexpr std::size_t tries = 6;
@@ -166,14 +173,14 @@ void append_level_runs(const Contours& contours, std::size_t c, std::int32_t z,
 }
 
 void cut_levels(PathBuilder& path, const LayerCut& cut, const Tool& tool, const DropIndex& part,
-                std::vector<std::vector<LevelRun>>& levels, bool leads) {
+                std::vector<std::vector<LevelRun>>& levels, bool leads, LevelWays ways) {
     const double chord = safe_chord_mm(tool.diameter / 2, cut.job.tolerances.gouge);
     Waiting waiting(levels, to_units(tool.diameter));
     std::vector<const LevelRun*> runs;
     std::vector<Beginning> beginnings;
     for (const std::vector<LevelRun>& level : levels)
         for (const LevelRun& run : level) {
-            append_beginnings(run, static_cast<std::uint32_t>(runs.size()), beginnings);
+            append_beginnings(run, ways, static_cast<std::uint32_t>(runs.size()), beginnings);
             runs.push_back(&run);
         }
     NearestRuns ready(std::move(beginnings), runs.size());
