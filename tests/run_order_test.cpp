@@ -254,6 +254,34 @@ TEST(Chains, ABallGoesToTheNextRunOnTheSurfaceOrInOneHop) {
     EXPECT_GT(hops, 20);
 }
 
+// A slope's places are too far apart for a safe chord where it is steep; the way between them is the slope,
+// no stairs over it.
+TEST(Chains, ABallFollowsSteepSlopesBetweenItsPlaces) {
+    constexpr double chord = 0.2, radius = 1.5, cuts = chord * chord / (8 * radius);
+    const std::function<double(double, double)> plane = [](double x, double y) { return 7 + x - 0.3 * y; },
+                                                hills = [](double x, double y) {
+                                                    return 2 * waves(x, y) - 1;
+                                                };
+    for (const auto& height : {plane, hills}) {
+        const Hills of(height);
+        const DropIndex part(of.cut.solid, ball_cutter(radius));
+        const Slide slide{.part = &part, .chord = chord, .top = 2 * kTop};
+        int upright = 0, places = 0;
+        for (double y = -4; y <= 4; y += 0.7) {
+            std::vector<PathPoint> line;
+            for (double x = -5; x <= 5; x += 0.19, ++places)
+                append_free(line, {to_units(x), to_units(y), to_units(part.drop(x, y).tip_z) + 1}, slide);
+            for (std::size_t k = 1; k < line.size(); ++k)
+                upright += line[k - 1].x == line[k].x && line[k - 1].y == line[k].y;
+            along(line, [&](double px, double py, double pz) {
+                ASSERT_GE(pz, part.drop(px, py).tip_z - cuts - 1e-3);
+            });
+        }
+        EXPECT_GT(places, 600);
+        EXPECT_LT(upright, places / 20);
+    }
+}
+
 // Ways a little over bent slopes are longer than those that keep to them, and stairs are few.
 TEST(RestWays, AFlatGoesStraightALittleOverSlopes) {
     Hills hills(waves);

@@ -49,20 +49,16 @@ public:
     }
 
 private:
-    // Straight up is always free, and so is a level chord of safe length at the height of the higher rest.
-    void append(std::vector<PathPoint>& points, PathPoint p) const {
-        if (!points.empty()) {
-            const PathPoint& q = points.back();
-            const double dx = static_cast<double>(p.x) - q.x, dy = static_cast<double>(p.y) - q.y,
-                         dz = static_cast<double>(p.z) - q.z;
-            const bool corner =
-                ball_ ? dx * dx + dy * dy + dz * dz > chord_ * chord_ * kUnitsPerMm * kUnitsPerMm : dz != 0;
-            if (corner) {
-                const PathPoint c = dz > 0 ? PathPoint{q.x, q.y, p.z} : PathPoint{p.x, p.y, q.z};
-                if (!(c == q) && !(c == p)) points.push_back(c);
-            }
-        }
-        points.push_back(p);
+    [[nodiscard]] Slide slide() const {
+        return {.part = index_,
+                .ball = ball_,
+                .chord = chord_,
+                .top = cut_.layer.z_top,
+                .near = kBridge,
+                .under = under_,
+                .hops = !pass_.in_steps,
+                .steepest = kSteepestWay,
+                .over = over_of(cut_.job)};
     }
 
     void append_runs(const RestLine& line, std::vector<std::vector<PathPoint>>& runs) const {
@@ -99,9 +95,10 @@ private:
     // the places of the run.
     std::vector<PathPoint> points_along(const std::vector<Place>& run) const {
         std::vector<PathPoint> points;
+        const Slide along = slide();
         const bool straight = !ball_ && !pass_.in_steps;
         for (std::size_t i = 0; i < run.size(); ++i) {
-            append(points, {run[i].x, run[i].y, run[i].z});
+            append_free(points, {run[i].x, run[i].y, run[i].z}, along);
             while (straight) {
                 const auto [j, z] = farthest_straight(run, i, points.back().z);
                 if (j == i) break;
@@ -174,18 +171,9 @@ private:
         PathBuilder path(op, tool_, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed),
                          cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
         path.set_surroundings(cut_.around(tool_, index_));
-        const Slide slide{.part = index_,
-                          .ball = ball_,
-                          .chord = chord_,
-                          .top = cut_.layer.z_top,
-                          .near = kBridge,
-                          .under = under_,
-                          .hops = !pass_.in_steps,
-                          .steepest = kSteepestWay,
-                          .over = over_of(cut_.job)};
         if (!pass_.in_steps) {
             cut_.context.throw_if_cancelled();
-            follow_nearest(path, chained(runs, slide));
+            follow_nearest(path, chained(runs, slide()));
             path.finish();
             return;
         }
@@ -221,7 +209,7 @@ private:
                         parts.push_back(simplify(part, simplify_tolerance_units(tolerance_))), part.clear();
                 }
             }
-            follow_nearest(path, chained(std::move(parts), slide));
+            follow_nearest(path, chained(std::move(parts), slide()));
         }
         path.finish();
     }

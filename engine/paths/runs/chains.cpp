@@ -10,6 +10,14 @@ namespace slabwright {
 
 namespace {
 
+constexpr double kMostParts =
+    8;  // of a way along the surface; one that is longer is a wall's, and is hopped over
+
+double length(const PathPoint& a, const PathPoint& b) {
+    return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y,
+                      static_cast<double>(b.z) - a.z);
+}
+
 Point2 flat_of(const PathPoint& p) { return {p.x, p.y}; }
 
 double way(const PathPoint& a, Point2 b) {
@@ -23,6 +31,33 @@ bool slope_is_free(const PathPoint& from, const PathPoint& to, const Slide& slid
            slide.part->way_is_free(a, b, slide.over);
 }
 
+// Appends a free place to a line whose last place is free, over the corner above the lower of the two where
+// the straight way may not be free.
+void append_by_steps(std::vector<PathPoint>& line, PathPoint p, const Slide& slide) {
+    if (!line.empty()) {
+        const PathPoint& q = line.back();
+        const double dz = static_cast<double>(p.z) - q.z;
+        if (slide.ball ? length(q, p) > slide.chord * kUnitsPerMm : dz != 0) {
+            const PathPoint corner = dz > 0 ? PathPoint{q.x, q.y, p.z} : PathPoint{p.x, p.y, q.z};
+            if (!(corner == q) && !(corner == p)) line.push_back(corner);
+        }
+    }
+    line.push_back(p);
+}
+
+// A place between two, on the straight way or on the surface where that is higher; none on the top.
+std::optional<PathPoint> free_between(const PathPoint& from, const PathPoint& to, double t,
+                                      const Slide& slide) {
+    PathPoint p{static_cast<std::int32_t>(from.x + t * (static_cast<double>(to.x) - from.x)),
+                static_cast<std::int32_t>(from.y + t * (static_cast<double>(to.y) - from.y)), 0};
+    const double lerp = from.z + t * (static_cast<double>(to.z) - from.z),
+                 matters = std::min(lerp / kUnitsPerMm, slide.top) - slide.under - 0.01,
+                 rest = slide.part->drop(to_mm(p.x), to_mm(p.y), matters).tip_z + slide.under;
+    if (rest >= slide.top - 1e-3) return std::nullopt;
+    p.z = static_cast<std::int32_t>(std::ceil(std::max(lerp, rest * kUnitsPerMm))) + 1;
+    return p;
+}
+
 // The places from one to another, the first left out; none where the way along the surface climbs onto the
 // top.
 std::optional<std::vector<PathPoint>> slide_between(const PathPoint& from, const PathPoint& to,
@@ -32,18 +67,12 @@ std::optional<std::vector<PathPoint>> slide_between(const PathPoint& from, const
     const auto n =
         static_cast<std::size_t>(std::ceil(way(from, flat_of(to)) / (0.75 * slide.chord * kUnitsPerMm)));
     for (std::size_t i = 1; i < n; ++i) {
-        const double t = static_cast<double>(i) / static_cast<double>(n);
-        PathPoint p{static_cast<std::int32_t>(from.x + t * (static_cast<double>(to.x) - from.x)),
-                    static_cast<std::int32_t>(from.y + t * (static_cast<double>(to.y) - from.y)), 0};
-        const double lerp = from.z + t * (static_cast<double>(to.z) - from.z),
-                     matters = std::min(lerp / kUnitsPerMm, slide.top) - slide.under - 0.01,
-                     rest = slide.part->drop(to_mm(p.x), to_mm(p.y), matters).tip_z + slide.under;
-        if (rest >= slide.top - 1e-3) return std::nullopt;
-        p.z = static_cast<std::int32_t>(std::ceil(std::max(lerp, rest * kUnitsPerMm))) + 1;
-        highest = std::max(highest, p.z);
-        append_free(link, p, slide);
+        const auto p = free_between(from, to, static_cast<double>(i) / static_cast<double>(n), slide);
+        if (!p) return std::nullopt;
+        highest = std::max(highest, p->z);
+        append_by_steps(link, *p, slide);
     }
-    append_free(link, to, slide);
+    append_by_steps(link, to, slide);
     if (slide.hops && link.size() > n + 1) {  // by steps
         link = {from};
         if (slide.ball || !slope_is_free(from, to, slide))
@@ -68,16 +97,14 @@ std::vector<Beginning> both_ends(const std::vector<std::vector<PathPoint>>& runs
 }  // namespace
 
 void append_free(std::vector<PathPoint>& line, PathPoint p, const Slide& slide) {
-    if (!line.empty()) {
-        const PathPoint& q = line.back();
-        const double dx = static_cast<double>(p.x) - q.x, dy = static_cast<double>(p.y) - q.y,
-                     dz = static_cast<double>(p.z) - q.z, chord = slide.chord * kUnitsPerMm;
-        if (slide.ball ? dx * dx + dy * dy + dz * dz > chord * chord : dz != 0) {
-            const PathPoint corner = dz > 0 ? PathPoint{q.x, q.y, p.z} : PathPoint{p.x, p.y, q.z};
-            if (!(corner == q) && !(corner == p)) line.push_back(corner);
-        }
+    if (slide.ball && !line.empty()) {
+        const PathPoint from = line.back();
+        const double parts = std::ceil(length(from, p) / (slide.chord * kUnitsPerMm));
+        for (double k = 1; k < parts && parts <= kMostParts; ++k)
+            if (const auto between = free_between(from, p, k / parts, slide))
+                append_by_steps(line, *between, slide);
     }
-    line.push_back(p);
+    append_by_steps(line, p, slide);
 }
 
 std::vector<std::vector<PathPoint>> chained(std::vector<std::vector<PathPoint>> runs, const Slide& slide) {

@@ -25,8 +25,9 @@ struct Slide {
 };
 
 /// Appends a free place to a line whose last place is free: straight where that is short enough to stay out
-/// of the part, else over the corner above the lower of the two. Straight up is always free, and so is level
-/// travel at the height of the higher; with a flat end mill only what is level is straight.
+/// of the part. A ball goes by places between, on the straight way or where the surface is higher, and only
+/// where these are still too far apart over the corner above the lower of two. Straight up is always free,
+/// and so is level travel at the height of the higher; with a flat end mill only what is level is straight.
 void append_free(std::vector<PathPoint>& line, PathPoint p, const Slide& slide);
 
 /// Joins runs, each of which may be cut either way. A chain begins with the first run left, and goes on with
