@@ -279,8 +279,8 @@ struct Cutting {
     RestPattern rest_pattern = RestPattern::contour;
     bool open_waste =
         true;           ///< contour roughing leaves what lies open from beside the stock to the face mill
-    bool climb = true;  ///< contour roughing keeps the stock on its right everywhere; false: either way,
-                        ///< where that is shorter
+    bool climb = true;  ///< contour roughing keeps the stock on its right, but the face mill in open waste;
+                        ///< false: open rings are cut either way
     double max_engagement = 0.7;  ///< share of the diameter that roughing meets at its full feed; 1: a slot
     double holder_clearance = 2.0;
     double finish_feed = 5000;

@@ -457,7 +457,7 @@ void visit_plain_job_keys(JobLike& job, Visit& visit) {
     visit.key("open_waste", job.cutting.open_waste,
               "contour roughing leaves what lies open from beside the stock to the face mill");
     visit.key("climb", job.cutting.climb,
-              "contour roughing climbs everywhere; false: either way, where that is shorter");
+              "contour roughing climbs, but the face mill in open waste; false: either way");
     visit.key("max_engagement", job.cutting.max_engagement,
               "share of the diameter that roughing meets at full feed; slower in proportion where it meets "
               "more; 1: no limit");

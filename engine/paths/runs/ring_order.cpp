@@ -282,10 +282,10 @@ private:
 // piece that has been cut, and is turned over where that piece is the nearer one to the forbidden region: so
 // the stock is on the right again.
 void begin_beside(const Turns& turns, std::size_t chosen, Point2 at, RingPlan::Piece& piece, Start& start) {
+    if (!piece.closed) return;
     const Turns::Beside beside = turns.cut_beside(chosen);
     if (!beside.any) return;
     if (!beside.farther) std::reverse(piece.points.begin(), piece.points.end());
-    if (!piece.closed) return;
     const PathPoint from{at.x, at.y, piece.points.front().z};
     start = {};
     for (std::size_t k = 0; k + 1 < piece.points.size(); ++k) {
@@ -391,6 +391,7 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
     cut_frames(path, plan);
     for (const std::vector<PathPoint>& strip : plan.strips) path.follow(strip);
     Turns turns(plan);
+    const bool either_end = plan.from_open || !cut.job.cutting.climb;
     std::size_t ring = 0;  // that the tool is on, while it is down; none yet
     std::vector<std::size_t> cut_already;
     while (!turns.ready.empty()) {
@@ -401,7 +402,7 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
         for (const std::size_t k : turns.ready) far = std::max(far, plan.pieces[k].ring);
         for (std::size_t k = 0; k < turns.ready.size(); ++k)
             if ((!plan.hold || plan.pieces[turns.ready[k]].ring == far) &&
-                nearer(plan.pieces[turns.ready[k]], path.at(), !cut.job.cutting.climb, start))
+                nearer(plan.pieces[turns.ready[k]], path.at(), either_end, start))
                 next = k;
         const std::size_t chosen = turns.ready[next];
         RingPlan::Piece& piece = plan.pieces[chosen];

@@ -65,13 +65,13 @@ struct RingPlan {
     std::int32_t z = 0;
     bool hold = false;  ///< all rings of one distance are cut before any nearer one
     /// Each piece is begun beside one that has been cut, from those at the stock's edge on: for a cutter that
-    /// does not go down into stock. Not with hold.
+    /// does not go down into stock. Open ones go either way. Not with hold.
     bool from_open = false;
 };
 
 /// Plans to clear everything between `forbidden` and the edge of the stock at one height: first in rectangles
 /// from the stock's edge as far as these surround the forbidden region, then in rings around that region. The
-/// forbidden region is on the right of every ring (but see Cutting::climb), so the cutter climbs.
+/// forbidden region is on the right of every ring, so the cutter climbs (but see from_open, Cutting::climb).
 /// Neighbouring rings are at most ring_step(), with `hold` no more than 0.45 of the diameter,
 /// ring_tolerance() and 0.04 mm apart, rectangles ring_step() or, of a face mill, 0.6 of the diameter; the
 /// ring next to the forbidden region keeps within 0.02 mm of its border. Without pieces the forbidden region
