@@ -284,6 +284,36 @@ TEST(Roughing, ALevelWithoutAWayInIsTheEndMills) {
     EXPECT_NEAR(r.standing.top(1, {1, -10}, {1, -10}), kTop, 1e-3);
 }
 
+// Strips that end beside the stock at both ends are cut to and fro: no way back over what has been cut.
+TEST(Roughing, OpenRingsOfTheFaceMillGoEitherWay) {
+    Roughed r(posts_and_pocket, {-160, -150}, {150, 140}, 2.2, 2, true);
+    const std::int32_t z = to_units(kTop - 4);
+    OpenLevel open;
+    open.whole = true, open.above = kTop, open.saved = 5;
+    open.rings.z = z, open.rings.radius = 25, open.rings.step = 25, open.rings.from_open = true;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const std::int32_t y = to_units(-105 - 20 * static_cast<double>(k));
+        RingPlan::Piece piece;
+        piece.points = {{to_units(-200), y, z}, {to_units(190), y, z}};
+        piece.ring = k;
+        piece.box = {static_cast<double>(to_units(-200)), static_cast<double>(y),
+                     static_cast<double>(to_units(190)), static_cast<double>(y)};
+        open.rings.pieces.push_back(piece);
+    }
+    std::vector<OpenLevel> levels{open};
+    const Operation op = clear_open_waste(r.cut, r.job.tools[0], levels, nullptr);
+    double cut = 0, backwards = 0, over = 0;
+    for (std::size_t k = 1; k < op.moves.size(); ++k) {
+        const Move &a = op.moves[k - 1], &b = op.moves[k];
+        const double way = std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y));
+        if (b.feed == 0) over += cut > 0 ? way : 0;
+        else cut += way, backwards += b.x < a.x ? way : 0;
+    }
+    EXPECT_GT(cut, 3 * 300);
+    EXPECT_LT(std::abs(cut - 2 * backwards), 1.1 * 390) << "one way or the other by turns";
+    EXPECT_LT(over, 120);
+}
+
 // Passes of .75 mm take longer than the end mill on whole levels, but not on the shallow last ones: over
 // these, everything must be gone.
 TEST(Roughing, FaceMillTakesNoLevelBelowOneThatItLeaves) {

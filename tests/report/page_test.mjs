@@ -49,14 +49,15 @@ const change = (selector, value) => page.locator(selector).evaluate((element, v)
 const stage = name => page.locator('#scene').getAttribute(`data-${name}`);
 const numbers = text => text.split(',').map(Number);
 
+const clock = minutes => { const m = Math.round(minutes); return m < 60 ? `${m} min` : `${Math.floor(m / 60)} h ${String(m % 60).padStart(2, '0')} min`; };
+
 // What it says equals what it was made from.
 {
     const data = await page.evaluate(() => JSON.parse(document.getElementById('slabwright-data').textContent));
     check.equal('data: plan.json', data.plan, plan);
     check.equal('data: verify.json', data.verify, verify);
     const text = await page.locator('#summary').textContent();
-    const minutes = Math.round(plan.totals.build_minutes);
-    check.that('summary: build time', (await page.locator('#build-time').textContent()) === `${Math.floor(minutes / 60)} h ${String(minutes % 60).padStart(2, '0')} min`);
+    check.equal('summary: build time', await page.locator('#build-time').textContent(), clock(plan.totals.build_minutes));
     check.that('summary: verdict', (await page.locator('#verdict .answer').textContent()).startsWith(verify.passed ? 'Yes' : 'No'));
     check.that('summary: gouge', text.includes(`${Number(verify.totals.gouge_max_mm.toFixed(4))} mm`));
     check.that('summary: left-over', text.includes(`${Number(verify.totals.left_over_missed_max_mm.toFixed(3))} mm`));
@@ -85,7 +86,6 @@ const numbers = text => text.split(',').map(Number);
 
 // The sheets say what the plan says, once.
 {
-    const clock = minutes => { const m = Math.round(minutes); return m < 60 ? `${m} min` : `${Math.floor(m / 60)} h ${String(m % 60).padStart(2, '0')} min`; };
     const minutesOf = text => { const [, h, m] = /(?:(\d+) h )?(\d+) min/.exec(text); return 60 * Number(h ?? 0) + Number(m); };
     const cover = page.locator('.sheet.cover');
     check.that('cover: the build time', (await cover.locator('.clock').textContent()).includes(clock(plan.totals.build_minutes)));
