@@ -36,12 +36,12 @@ constexpr double kUpright = 89.5, kLevel = 0.5, kSteep = 45;  // degrees
 /// of castings and of a pool (bench/quote --fit), least squares of relative errors, those over a quarter
 /// weighing less. Walls and floors are small beside these and go with the places.
 struct Rates {
-    double facing = 2.219, roughing = 0.752, contours = 2.111, raster = 3.837;
+    double facing = 1.977, roughing = 0.582, contours = 2.310, raster = 3.177;
     double narrow =
-        17.39;            // narrow air is roughed by the end mill and again by the finishing tool, and slowly
-    double thin = 31.68;  // thin walls are spared by feed and by passes
-    double place = 2.529;   // min
-    double turn = 0.03313;  // min a radian: machines slow down where an outline turns
+        14.37;            // narrow air is roughed by the end mill and again by the finishing tool, and slowly
+    double thin = 24.17;  // thin walls are spared by feed and by passes
+    double place = 2.407;  // min
+    double turn = 0.0288;  // min a radian: machines slow down where an outline turns
 };
 constexpr Rates kRates{};
 constexpr double kSmallPlace = 150;  // mm: a loop so long counts as half a place
