@@ -138,15 +138,20 @@ TEST(ReportOutlines, EveryPointLeftOutLiesNearTheOutline) {
     }
 }
 
+// A layer of 50 mm from a slab half a millimetre thicker, without programs yet.
+SimulationInput one_layer(const PatternMesh& pattern) {
+    SimulationInput input;
+    input.mesh = pattern.mesh.view();
+    input.stock_min = {-80, -80}, input.stock_max = {80, 80};
+    input.layers.push_back({0, 50, 50.5, {}});
+    input.tools = Job().tools;
+    return input;
+}
+
 TEST(Replay, AStraightSlotIsAsDeepAndAsWideAsItIs) {
     Context context;
     const PatternMesh stl = read_pattern_mesh(context, kStl);
-    SimulationInput input;
-    input.mesh = stl.mesh.view();
-    input.stock_min = {-80, -80}, input.stock_max = {80, 80};
-    input.layers.push_back({0, 50, 50.5, {}});
-    Job job;
-    input.tools = job.tools;
+    SimulationInput input = one_layer(stl);
     ReplayOptions options;
     options.cell = 0.5;
     options.pieces = 20;
@@ -198,11 +203,7 @@ TEST(Replay, AStraightSlotIsAsDeepAndAsWideAsItIs) {
 TEST(Replay, EveryCutHasAForceHoweverSlowItIs) {
     Context context;
     const PatternMesh stl = read_pattern_mesh(context, kStl);
-    SimulationInput input;
-    input.mesh = stl.mesh.view();
-    input.stock_min = {-80, -80}, input.stock_max = {80, 80};
-    input.layers.push_back({0, 50, 50.5, {}});
-    input.tools = Job().tools;
+    SimulationInput input = one_layer(stl);
     const auto force = [&](double feed, double rpm) {
         Program program;
         program.tool = 2;
