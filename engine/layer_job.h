@@ -2,7 +2,7 @@
 #pragma once
 
 #include <array>
-#include <limits>
+#include <optional>
 #include <vector>
 
 #include "engine/plan.h"
@@ -33,6 +33,16 @@ struct DrilledHole {
     double around = 0;    ///< mm: of the circle on which an end mill's middle goes down; 0: straight down
 };
 
+/// Minutes of a layer's programs, at the feeds that they are planned with, up to the end of each stage of its
+/// paths: waste cleared, level contours, projected finish, all.
+using LayerPace = std::array<double, 4>;
+
+/// What a set of tools has to come near.
+struct PaceAhead {
+    LayerPace pace{};   ///< of the best set so far
+    LayerPace least{};  ///< share of what that still has to do after each stage that is left to this one, too
+};
+
 /// A layer's work is a value in and a value out.
 struct LayerJob {
     /// The pattern, pattern-base, or a lighter one that lies as near to it as the job's `gouge` leaves room
@@ -51,8 +61,8 @@ struct LayerJob {
     ProgressPart* progress =
         nullptr;             ///< told how far the paths are, up to kPathsShare; the rest is the caller's
     std::vector<Flat> feet;  ///< on which walls of this layer may stand: `flats` and those just below
-    double most_minutes = std::numeric_limits<double>::infinity();  ///< when its programs so far take longer
-                                                                    ///< than this, the layer is given up
+    bool paced = false;      ///< its pace is asked for
+    std::optional<PaceAhead> ahead;  ///< when these tools cannot come near it they are given up
     double last_steps =
         0;  ///< mm that the last two levels of roughing may go down, for the wood's sake; 0: any step
     ScratchPool<StockMemory>* stock_memory =

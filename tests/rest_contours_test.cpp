@@ -11,6 +11,7 @@
 
 #include "engine/paths/operations/roughing.h"
 #include "engine/paths/operations/semi_rough.h"
+#include "engine/paths/paths.h"
 #include "engine/planner/planner.h"
 #include "engine/tool_choice/select.h"
 #include "engine/tools/libraries.h"
@@ -341,6 +342,34 @@ TEST(RestContours, LuosSampleIsFasterOnContoursAndVerifies) {
     write(context, plan(context, stl, job), folder / "out");
     const VerifyResult result = verify(context, folder / "out", stl);
     EXPECT_TRUE(result.passed) << (result.violations.empty() ? "" : result.violations[0].message);
+}
+
+// A set of tools is given up once it cannot come near the best one, and not before.
+TEST(RestContours, ToolsThatFallTooFarBehindAreGivenUp) {
+    Notch n;
+    n.layer.paced = true;
+    const LayerResult best = plan_layer_paths(n.context, n.layer);
+    EXPECT_FALSE(best.given_up);
+    EXPECT_GT(best.pace[0], 0);
+    EXPECT_TRUE(std::is_sorted(best.pace.begin(), best.pace.end()));
+    const auto beside = [&](double times, std::size_t from, LayerPace least) {
+        PaceAhead ahead{best.pace, least};
+        for (std::size_t s = from; s < ahead.pace.size(); ++s) ahead.pace[s] *= times;
+        n.layer.ahead = ahead;
+        return plan_layer_paths(n.context, n.layer);
+    };
+    const LayerResult same = beside(1, 0, {1, 1, 1, 1});
+    EXPECT_FALSE(same.given_up);
+    EXPECT_EQ(same.operations.size(), best.operations.size());
+    const LayerResult behind = beside(0.5, 0, {1, 1, 1, 1});
+    EXPECT_TRUE(behind.given_up);
+    EXPECT_LT(behind.operations.size(), best.operations.size());
+    EXPECT_EQ(behind.pace[1], 0) << "given up after the first stage";
+    // As far behind, it may still make up for it in what comes after that stage.
+    const double first = best.pace[0], all = best.pace.back();
+    ASSERT_LT(first, 0.5 * 1.2 * all) << "else there is no such case";
+    EXPECT_FALSE(beside(1 / 1.19, 3, {0, 0, 0, 1}).given_up);
+    EXPECT_TRUE(beside(1 / 1.21, 3, {0, 0, 0, 1}).given_up) << "at the end";
 }
 
 // Slots hardly wider than the end mill. Seed 2 has one that is .05 mm wider where it is narrowest: the place

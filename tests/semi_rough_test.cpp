@@ -8,12 +8,16 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <random>
+#include <vector>
 
 #include "engine/paths/operations/rest.h"
+#include "engine/paths/operations/rest_targets.h"
 #include "engine/paths/operations/roughing.h"
 #include "engine/paths/operations/semi_rough.h"
 #include "tests/support/end_mill_job.h"
 #include "tests/support/height_field.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
@@ -249,6 +253,88 @@ TEST(RestMachining, ClearsGroovesAlongThem) {
     // The other diagonal is across those of the mesh.
     for (const double degrees : {45.0, 90.0})
         EXPECT_LT(moves_along_groove(degrees), 1.7 * along_x) << degrees;
+}
+
+// A pocket with a fillet of 2.5 mm along its feet, and a slot with upright walls.
+double filleted_or_slot(double x, double /*y*/) {
+    if (x > 0) return x > 5 && x < 14 ? 4 : 10;
+    const double wall = 8 - std::abs(x + 10), into = 2.5 - std::clamp(wall, 0.0, 2.5);
+    return wall < 0 ? 10 : 4 + 2.5 - std::sqrt(2.5 * 2.5 - into * into);
+}
+
+// Where a ball follows, a flat end mill takes the feet of upright walls, as many as otherwise, and no slope.
+TEST(RestMachining, AFlatLeavesSlopesToTheBallThatFollows) {
+    std::array<double, 2> in_fillets{}, in_slot{};  // mm by feed
+    std::array<std::size_t, 2> left_in_slot{};      // cells over the limit
+    for (const bool on_slopes : {false, true}) {
+        Waste w(filleted_or_slot, {});
+        Tool flat = w.layer.tools.finish;
+        flat.kind = ToolKind::flat;
+        LayerStock stock(w.cut.context, w.cut.layer, w.cut.solid, 0.2);
+        stock.cut(w.cut.context, rough_layer(w.cut).back(), w.layer.tools.rough);
+        constexpr double limit = 0.06;
+        (void)cut_rest(w.cut, stock, w.layer.tools.finish, {OperationKind::finish, "ball", limit, false});
+        const Operation op = cut_rest(
+            w.cut, stock, flat,
+            {.kind = OperationKind::corner, .purpose = "corners", .limit = limit, .on_slopes = on_slopes});
+        for (std::size_t i = 1; i < op.moves.size(); ++i) {
+            const Move &a = op.moves[i - 1], &b = op.moves[i];
+            if (b.feed > 0)
+                (b.x < 0 ? in_fillets : in_slot)[on_slopes ? 1 : 0] +=
+                    std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y), to_mm(b.z - a.z));
+        }
+        const CellGrid& grid = stock.grid();
+        for (int j = 0; j < grid.ny; ++j)
+            for (int i = 0; i < grid.nx; ++i)
+                left_in_slot[on_slopes ? 1 : 0] += grid.x(i) > 5.6 && grid.x(i) < 13.4 &&
+                                                   std::abs(grid.y(j)) < 19 &&
+                                                   stock.left(grid.index(i, j)) > limit;
+    }
+    EXPECT_GT(in_fillets[1], 500);
+    EXPECT_LT(in_fillets[0], 0.3 * in_fillets[1]);
+    EXPECT_GT(in_slot[0], 50);
+    EXPECT_EQ(left_in_slot[0], left_in_slot[1]);
+}
+
+// Of the cells that a pass is for, those near a place are the same whether the others were forgotten or are
+// passed over.
+TEST(RestMachining, ForgetsOnlyWhatIsDone) {
+    const auto bumps = [](double x, double y) {
+        return 6 + 2.5 * std::abs(std::sin(x / 4)) * std::abs(std::cos(y / 5 + x / 9));
+    };
+    Waste w(bumps, {});
+    LayerStock stock(w.cut.context, w.cut.layer, w.cut.solid, 0.2);
+    stock.cut(w.cut.context, rough_layer(w.cut).back(), w.layer.tools.rough);
+    const RestPass pass{.limit = 0.06};
+    RestTargets all(w.context, stock, pass, 1, nullptr, 3), some(w.context, stock, pass, 1, nullptr, 3);
+    std::mt19937_64 random(test::seed());
+    std::uniform_real_distribution<double> place(-22, 22), height(0, 12);
+    std::size_t met = 0, forgotten = 0;
+    for (int turn = 0; turn < 20; ++turn) {
+        for (int k = 0; k < 10; ++k)
+            stock.cut_at({CutterEnd::Form::flat, 3, 0}, place(random), place(random), 6);
+        some.forget(pass.limit);
+        for (int k = 0; k < 20; ++k) {
+            const double x = place(random), y = place(random), above = height(random);
+            const auto near = [&](const RestTargets& targets) {
+                std::vector<std::array<int, 2>> cells;
+                (void)targets.any_near(x, y, 3, above, [&](int i, int j) {
+                    const std::size_t c = stock.grid().index(i, j);
+                    if (stock.height(c) <= above) return false;
+                    if (static_cast<double>(stock.left(c)) > pass.limit) cells.push_back({i, j});
+                    else if (&targets == &all) ++forgotten;
+                    else ADD_FAILURE() << "cell " << i << ' ' << j << " is done";
+                    return false;
+                });
+                return cells;
+            };
+            const auto cells = near(all);
+            EXPECT_EQ(near(some), cells);
+            met += cells.size();
+        }
+    }
+    EXPECT_GT(met, 10000U);
+    EXPECT_GT(forgotten, 1000U);
 }
 
 TEST(RestMachining, FollowsChannelsAsFarAsTheyAreWideEnough) {

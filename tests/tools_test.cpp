@@ -43,10 +43,18 @@ TEST(Tools, LuosLibrary) {
     EXPECT_EQ(tools.rest[0].kind, ToolKind::flat);
     EXPECT_DOUBLE_EQ(tools.rest[0].diameter, 6.35);
     EXPECT_DOUBLE_EQ(tools.rest[1].diameter, 3.175);
-    EXPECT_EQ(tools.rest[1].kind, ToolKind::flat) << "a flat goes before a ball of its size";
-    EXPECT_EQ(tools.rest[2].kind, ToolKind::ball);
-    EXPECT_EQ(next_wider_ball(job, tools.finish)->diameter, 12.7);
-    EXPECT_FALSE(next_wider_ball(job, luo_library().back()).has_value());
+    EXPECT_EQ(tools.rest[1].kind, ToolKind::ball) << "a ball goes before a flat of its size";
+    EXPECT_EQ(tools.rest[2].kind, ToolKind::flat);
+    const std::optional<LayerTools> wider = with_wider_finish(job, tools);
+    ASSERT_TRUE(wider.has_value());
+    EXPECT_DOUBLE_EQ(wider->finish.diameter, 12.7);
+    EXPECT_EQ(wider->rough.number, tools.rough.number);
+    EXPECT_TRUE(std::any_of(wider->rest.begin(), wider->rest.end(), [&](const Tool& t) {
+        return t.number == tools.finish.number;
+    })) << "where the wider one does not reach";
+    LayerTools widest = tools;
+    widest.finish = luo_library().back();
+    EXPECT_FALSE(with_wider_finish(job, widest).has_value());
 }
 
 // The shop's libraries reach through a 19 mm slab as the default set does, so that nobody pays for a small
@@ -138,14 +146,33 @@ TEST(Tools, ALayerIsNeverSlowerThanWithTheFixedSet) {
         EXPECT_LE(*taken->left_mm2, 1.1 * *sets.front().left_mm2 + 5);
         for (const ToolSet& other : sets) {
             EXPECT_FALSE(other.reason.empty());
-            // Of a set that was given up only the first programs are known: they alone take longer.
-            if (!other.left_mm2 || *other.left_mm2 <= *sets.front().left_mm2) {
+            // Of a set that was given up only the first programs are known.
+            if (other.left_mm2 && *other.left_mm2 <= *sets.front().left_mm2) {
                 EXPECT_LE(taken->minutes, other.minutes);
             }
         }
+        // None is planned twice.
+        for (std::size_t s = 0; s < sets.size(); ++s)
+            for (std::size_t t = 0; t < s; ++t)
+                EXPECT_FALSE(sets[s].tools == sets[t].tools && sets[s].minutes == sets[t].minutes) << s;
         for (const ToolCandidate& c : layer.selection->candidates) EXPECT_FALSE(c.reason.empty());
     }
     for (const Layer& layer : fixed.layers) EXPECT_FALSE(layer.selection.has_value());
+}
+
+// From wide to narrow; of a flat and a ball as wide, the ball is first: a fillet that it sweeps in a few
+// lines takes the flat many.
+TEST(Tools, RestIsForTheBallBeforeTheFlatAsWide) {
+    Job job;
+    job.tools = shop_library();
+    const Tool& rough = tool_of_kind(job, ToolKind::flat);
+    const std::vector<Tool> rest = rest_tools(job, rough, 0.5 * kInch);
+    ASSERT_EQ(rest.size(), 4U);
+    for (std::size_t k = 0; k < 2; ++k) {
+        EXPECT_EQ(rest[2 * k].kind, ToolKind::ball);
+        EXPECT_EQ(rest[2 * k + 1].kind, ToolKind::flat);
+        for (std::size_t i : {2 * k, 2 * k + 1}) EXPECT_NEAR(rest[i].diameter, kInch / (4 << k), 1e-9);
+    }
 }
 
 // A library with a slender ball and a stout one as wide: where the slender one would bend too far at any feed

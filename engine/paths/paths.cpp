@@ -184,6 +184,7 @@ public:
         report_no_way_in(cut_, result_);
         for (Operation& op : drill_holes(cut_)) take(std::move(op));
         reached(0.95);
+        if (hopeless(3)) return std::move(result_);
         report_loose(cut_, result_);
         // Last, so that everything before has straight moves only to think of.
         for (Operation& op : result_.operations) {
@@ -227,17 +228,18 @@ private:
         for (const Operation& op : operations) sum += minutes_of(op, cut_.job.machine);
         return sum;
     }
-    // Whether the operations so far, which all stay, take too long. Arcs may be run faster than the straight
-    // moves they are made of.
-    bool hopeless() {
-        if (std::isinf(layer_.most_minutes)) return false;
-        if (minutes(result_.operations) <= layer_.most_minutes) return false;
-        std::vector<Operation> fitted = result_.operations;
-        for (Operation& op : fitted) fit(op);
-        if (minutes(fitted) <= layer_.most_minutes) return false;
-        result_.operations = std::move(fitted);
-        result_.given_up = true;
-        return true;
+    // Notes the pace of the operations so far, which all stay. Whether other tools are too far ahead of them.
+    bool hopeless(std::size_t stage) {
+        if (!layer_.paced) return false;
+        for (; paced_ < result_.operations.size(); ++paced_)
+            so_far_ += minutes_of(result_.operations[paced_], cut_.job.machine);
+        result_.pace[stage] = so_far_;
+        if (!layer_.ahead) return false;
+        constexpr double kHopeless = 1.2;  // adapted feeds seldom make up for as much
+        const auto& [ahead, least] = *layer_.ahead;
+        const double still = least[stage] * (ahead.back() - ahead[stage]);
+        result_.given_up = so_far_ + still > kHopeless * ahead.back();
+        return result_.given_up;
     }
 
     // Slopes by level contours and by lines projected on them. @param done(operation) may strike its moves
@@ -248,13 +250,14 @@ private:
         reached(0.56);
         done(levels);
         take(std::move(levels));
-        if (hopeless()) return;
+        if (hopeless(1)) return;
         Operation projected = cut_.job.cutting.projection == Projection::offset
                                   ? finish_offsets(cut_, result_.diagnostics)
                                   : finish_raster(cut_, result_.diagnostics);
         reached(0.75);
         done(projected);
         take(std::move(projected));
+        (void)hopeless(2);
     }
 
     // What stands decides the rest: waste where the roughing cutter does not fit before the ball finishes,
@@ -262,12 +265,11 @@ private:
     // limit anywhere.
     void finish_by_what_stands(LayerStock& stock) {
         clear_waste(stock);
-        if (hopeless()) return;
+        if (hopeless(0)) return;
         finish([&](Operation& op) {
             if (stock.cut(context_, op, tools_.finish).few()) op.moves.clear();
         });
-        if (result_.given_up || hopeless()) return;
-        cut_corners(stock);
+        if (!result_.given_up) cut_corners(stock);
     }
 
     void take_stock() {
@@ -301,7 +303,14 @@ private:
                 kWaste,
                 true,
                 0,
-                semi_rough_allowance(cut_.job, tool, kWaste)};
+                semi_rough_allowance(cut_.job, tool, kWaste),
+                0,
+                followed(tool)};
+    }
+    [[nodiscard]] bool followed(const Tool& tool) const {
+        return std::any_of(tools_.rest.begin(), tools_.rest.end(), [&](const Tool& t) {
+            return has_ball_tip(t.kind) == has_ball_tip(tool.kind) && tip_diameter(t) < tip_diameter(tool);
+        });
     }
     void semi_rough(LayerStock& stock, const Tool& tool, double swath) {
         constexpr const char* purpose = "waste beside the roughing cutter";
@@ -313,6 +322,12 @@ private:
     [[nodiscard]] bool last_of_kind(const Tool& tool) const {
         return std::none_of(&tool + 1, tools_.rest.data() + tools_.rest.size(),
                             [&](const Tool& t) { return has_ball_tip(t.kind) == has_ball_tip(tool.kind); });
+    }
+
+    // A flat end mill takes many lines to a fillet that a ball as wide or less sweeps in few.
+    [[nodiscard]] bool ball_follows(const Tool& tool) const {
+        return std::any_of(&tool + 1, tools_.rest.data() + tools_.rest.size(),
+                           [](const Tool& t) { return has_ball_tip(t.kind); });
     }
 
     // Waste where the roughing cutter does not fit.
@@ -343,7 +358,11 @@ private:
                                          [](const Tool& t) { return t.kind == ToolKind::flat; });
         if (!smaller)
             take(cut_rest(cut_, stock, tools_.rough, {OperationKind::corner, "corners", limit, false}));
-        take(cut_rest(cut_, stock, tools_.finish, {OperationKind::finish, "what is left", limit, false}));
+        take(cut_rest(cut_, stock, tools_.finish,
+                      {.kind = OperationKind::finish,
+                       .purpose = "what is left",
+                       .limit = limit,
+                       .followed = followed(tools_.finish)}));
         reached(0.94);
         for (const Tool& tool : tools_.rest) cut_narrow(stock, tool, limit);
         if (cut_.job.cutting.edges)
@@ -362,10 +381,18 @@ private:
             take(semi_rough_layer(cut_, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
         else take(cut_rest(cut_, stock, tool, waste(tool, "waste in narrow places")));
         if (tool.kind == ToolKind::flat)
-            take(cut_rest(cut_, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
+            take(cut_rest(cut_, stock, tool,
+                          {.kind = OperationKind::corner,
+                           .purpose = "narrow corners",
+                           .limit = limit,
+                           .followed = followed(tool),
+                           .on_slopes = !ball_follows(tool)}));
         else
             take(cut_rest(cut_, stock, tool,
-                          {OperationKind::finish, "what is left in narrow places", limit, false}));
+                          {.kind = OperationKind::finish,
+                           .purpose = "what is left in narrow places",
+                           .limit = limit,
+                           .followed = followed(tool)}));
         if (!attempt || left - stock.area_over(context_, limit) >= kWorthAChange) return;
         attempt->undo();
         result_.operations.resize(operations);
@@ -378,6 +405,8 @@ private:
     std::unique_ptr<StockMemory> memory_;
     std::optional<LayerStock> stock_;  // none where steps are uniform, whatever stands
     std::size_t off_stock_ = 0;        // operations that have been taken off it
+    std::size_t paced_ = 0;            // operations that so_far_ (minutes) counts
+    double so_far_ = 0;
     Standing standing_;  // once the slab has been faced; every operation after that cuts its moves into it
     const bool contours_ = clears_on_contours(cut_.job);
     double levels_share_ = 0;

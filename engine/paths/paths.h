@@ -12,10 +12,11 @@ namespace slabwright {
 struct LayerResult {
     std::vector<Operation> operations;  ///< in the order of execution
     std::vector<Diagnostic> diagnostics;
-    double left_mm2 = 0;    ///< plan view of what is left over the cusp's limit; 0 where it is not followed
-                            ///< (Cutting::uniform_steps)
-    bool given_up = false;  ///< the operations are the first ones only, and take longer than `most_minutes`;
-                            ///< left_mm2 is not known
+    double left_mm2 = 0;  ///< plan view of what is left over the cusp's limit; 0 where it is not followed
+                          ///< (Cutting::uniform_steps)
+    LayerPace pace{};     ///< where it is asked for; as far as its stages were planned
+    bool given_up =
+        false;  ///< the operations are the first ones only (LayerJob::ahead); left_mm2 is not known
 };
 
 /// Face, rough, floors, walls, levels and raster of one layer, and what these leave. Operations that would

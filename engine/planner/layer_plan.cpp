@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <string>
 
@@ -24,15 +23,37 @@ namespace {
 constexpr double kSelectionShare = 0.3;  // of a layer's work, where its tools are chosen
 constexpr double kStrained = 1.03;       // of a limit: within that, what a plan states may hold
 constexpr double kFirstSetsShare =
-    0.4;  // of what then remains, the sets of the choice; those that they lead to take the rest
+    0.5;  // of what then remains, the sets of the choice; those that they lead to take the rest,
+constexpr double kWiderFinishShare = 0.25;  // a wider finish tool this
 
 // None may leave more than the first set, but for what differently fine cells see.
 constexpr double kMore = 1.1, kFew = 5;  // mm²
+
+bool same(const Tool& a, const Tool& b) {
+    return a.number == b.number && a.stepdown_min == b.stepdown_min && a.stepdown_max == b.stepdown_max;
+}
+bool same(const std::vector<Tool>& a, const std::vector<Tool>& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                      [](const Tool& t, const Tool& u) { return same(t, u); });
+}
+// Of the job's tools.
+bool same(const LayerTools& a, const LayerTools& b) {
+    return same(a.rough, b.rough) && same(a.finish, b.finish) && same(a.semi_rough, b.semi_rough) &&
+           same(a.rest, b.rest);
+}
+
+// A wider ball finishes in less than the tools ahead, and leaves more to the corners; a narrower roughing
+// cutter leaves less to all that follow.
+LayerPace still_to_do(const LayerTools& tools, const LayerTools& ahead) {
+    if (tools.rough.diameter < ahead.rough.diameter) return {0.2, 0.3, 0.5, 1};
+    return {0.5, 0.6, 0.9, 1};
+}
 
 // A layer as one set of tools makes it, with the forces of its programs and the feeds that they allow.
 struct Trial {
     PlannedLayer planned;
     double minutes = 0;  // of its programs and the changes of tool between them, where it is asked for
+    LayerPace pace{};    // where it is asked for
     bool floors_slowed = false;      // what thin walls bear made its floors take notably longer
     std::optional<double> left_mm2;  // none: given up before all its paths were planned
     bool leaves_more = false;        // than the first set
@@ -105,24 +126,27 @@ public:
     PlannedLayer run() {
         const bool selecting = selects_tools(ground_.plan.job), compare = fitted_.selection.compare;
         // First, so that the others are measured by it.
-        if (!selecting || compare) sets_.push_back({"fixed", fixed_tools(fitted_)});
+        if (!selecting || compare) add("fixed", fixed_tools(fitted_));
         if (selecting) choose();
         const bool may_widen = selecting && compare && !selection_->vertical;
-        const double chosen_at = selecting ? kSelectionShare : 0,
-                     middle = may_widen ? chosen_at + kFirstSetsShare * (1 - chosen_at) : 1;
+        const double chosen_at = selecting ? kSelectionShare : 0, rest = 1 - chosen_at,
+                     finish_at = may_widen ? chosen_at + kFirstSetsShare * rest : 1,
+                     rough_at = may_widen ? finish_at + kWiderFinishShare * rest : 1;
         progress_.reach(chosen_at);
-        try_sets(0, chosen_at, middle);
+        try_sets(0, chosen_at, finish_at);
         if (may_widen) {
-            // Of the sets planned so far the best, with a wider roughing cutter.
+            // Of the sets planned so far the best, with a wider finish tool, then with a wider roughing
+            // cutter.
             const std::size_t first = sets_.size();
-            for (LayerTools& tools : with_wider_rough(context_, work_, sets_[chosen_].tools))
-                sets_.push_back({"wider rough", std::move(tools)});
-            try_sets(first, middle, 1);
+            if (std::optional<LayerTools> tools = with_wider_finish(fitted_, sets_[chosen_].tools))
+                add("wider", std::move(*tools));
+            try_sets(first, finish_at, rough_at);
+            climb(with_wider_rough(context_, work_, sets_[chosen_].tools), rough_at);
         }
         if (selecting && compare && best_->strained)
             if (std::optional<LayerTools> stiffer = stiffer_tools(fitted_, sets_[chosen_].tools)) {
                 const std::size_t first = sets_.size();
-                sets_.push_back({"stiffer", std::move(*stiffer)});
+                add("stiffer", std::move(*stiffer));
                 try_sets(first, 1, 1);
             }
         if (selection_) give_reasons();
@@ -136,6 +160,12 @@ private:
         std::string name;
         LayerTools tools;
     };
+
+    // To be tried, unless it is among them.
+    void add(const char* name, LayerTools tools) {
+        if (std::none_of(sets_.begin(), sets_.end(), [&](const NamedSet& s) { return same(s.tools, tools); }))
+            sets_.push_back({name, std::move(tools)});
+    }
 
     // Flats between z and the layer's top.
     [[nodiscard]] std::vector<Flat> flats_between(double z) const {
@@ -154,14 +184,19 @@ private:
 
     void choose() {
         ToolChoice choice = select_tools(context_, work_, reach_ratio(context_, work_, ground_.scene));
-        std::optional<Tool> wider;
-        if (fitted_.selection.compare && !choice.record.vertical)
-            wider = next_wider_ball(fitted_, choice.tools.finish);
-        sets_.push_back({"selected", std::move(choice.tools)});
+        add("selected", std::move(choice.tools));
         selection_ = std::move(choice.record);
-        // One narrow place may have decided for the whole layer: the next wider finish tool, with smaller
-        // ones in that place only.
-        if (wider) sets_.push_back({"wider", select_tools(context_, work_, {}, wider).tools});
+    }
+
+    // Tries sets from the last to the first for as long as that pays.
+    void climb(std::vector<LayerTools> sets, double from) {
+        const double step = (1 - from) / static_cast<double>(std::max<std::size_t>(1, sets.size()));
+        for (; !sets.empty(); sets.pop_back(), from += step) {
+            const std::size_t first = sets_.size();
+            add("wider rough", std::move(sets.back()));
+            try_sets(first, from, from + step);
+            if (first < sets_.size() && chosen_ != first) return;
+        }
     }
 
     // Plans the sets from `first` on; their share of the progress is [from, to].
@@ -170,12 +205,7 @@ private:
         for (std::size_t s = first; s < sets_.size(); ++s) {
             const double at = from + step * static_cast<double>(s - first);
             ProgressPart part(progress_, at, at + step);
-            // Adapted feeds seldom make a plan faster by so much; a set that is given up for it is not proven
-            // slower.
-            constexpr double kHopeless = 1.5;
-            judge(s, plan_with(sets_[s].tools,
-                               best_ ? kHopeless * best_->minutes : std::numeric_limits<double>::infinity(),
-                               part));
+            judge(s, plan_with(sets_[s].tools, part));
             part.reach(1);
         }
     }
@@ -184,11 +214,11 @@ private:
     // walls that bear it the quickest. Where thin ones do not, and its feed falls or it goes in several
     // passes, the walls are tried first: level by level, around them and so from both sides, and nothing of
     // them is left to the floors.
-    Trial plan_with(const LayerTools& tools, double most, ProgressPart& part) {
-        Trial trial = plan_once(tools, most, part);
+    Trial plan_with(const LayerTools& tools, ProgressPart& part) {
+        Trial trial = plan_once(tools, part);
         if (!walls_ || !trial.floors_slowed) return trial;
         work_.walls_first = true;
-        Trial other = plan_once(tools, most, part);
+        Trial other = plan_once(tools, part);
         work_.walls_first = false;
         if (!other.whole || other.leaves_more ||
             (other.left_mm2 && trial.left_mm2 && *other.left_mm2 > kMore * *trial.left_mm2 + kFew))
@@ -197,9 +227,8 @@ private:
                                                                                                    : trial;
     }
 
-    // @param most minutes: where the paths alone take longer at the feeds they are planned with, they are not
-    // followed any further
-    Trial plan_once(const LayerTools& tools, double most, ProgressPart& part) {
+    // Where the best set so far is too far ahead, and holds, the paths are not followed any further.
+    Trial plan_once(const LayerTools& tools, ProgressPart& part) {
         const Job& job = ground_.plan.job;
         work_.tools = tools;
         work_.progress = &part;
@@ -208,7 +237,11 @@ private:
             job.machine.base_board_cut >= 0 ? overrun_.board : std::min(below, overrun_.board);
         work_.floor_below = layer_.z_bottom - (ground_.carried_by ? below : board);
         work_.feet = flats_between(work_.floor_below);
-        work_.most_minutes = most;
+        const bool compared = selection_ || sets_.size() > 1;  // else nobody asks for its time
+        work_.paced = compared;
+        work_.ahead.reset();
+        if (best_ && !best_->strained)
+            work_.ahead = PaceAhead{best_->pace, still_to_do(tools, sets_[chosen_].tools)};
         work_.last_steps =
             overhang_ ? last_rough_steps(job, tools.rough, overhang_->largest() + job.bonding.edge_setback,
                                          layer_.z_top - layer_.z_bottom)
@@ -228,9 +261,9 @@ private:
                           *std::find_if(job.tools.begin(), job.tools.end(),
                                         [&](const Tool& t) { return t.number == op.tool; }),
                           job);
-        const bool compared = selection_ || sets_.size() > 1;  // else nobody asks for its time
         if (compared) trial.minutes = minutes_of(layer, job.machine);
-        trial.whole = !result.given_up && trial.minutes <= most;
+        trial.pace = result.pace;
+        trial.whole = !result.given_up;
         if (!trial.whole || trial.leaves_more || job.cutting.engagement != Engagement::simulated)
             return trial;
         const double floors = walls_ ? floor_minutes(layer, job.machine) : 0;
@@ -255,14 +288,11 @@ private:
                                                                  {}});
             if (!trial.left_mm2)
                 set.reason =
-                    fmt::format("given up: its first programs alone take {:.1f} min, against {:.1f} min",
+                    fmt::format("given up: {:.1f} min of it are too far behind the set of {:.1f} min",
                                 trial.minutes, best_->minutes);
             else if (trial.leaves_more)
                 set.reason = fmt::format("leaves {:.1f} mm² over the limit, the first set {:.1f} mm²",
                                          *trial.left_mm2, selection_->sets[0].left_mm2.value_or(0));
-            else if (!trial.whole)
-                set.reason = fmt::format("its paths alone take {:.1f} min, against {:.1f} min", trial.minutes,
-                                         best_->minutes);
             else if (trial.strained)
                 set.reason =
                     fmt::format("cutter, spindle or a thin wall would bear {:.2f} times what they may",

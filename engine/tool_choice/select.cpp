@@ -65,13 +65,11 @@ double perimeter(const Loops& loops) {
 
 class Chooser {
 public:
-    Chooser(Context& context, const LayerJob& layer, const ReachRatio& ratio,
-            const std::optional<Tool>& finish)
+    Chooser(Context& context, const LayerJob& layer, const ReachRatio& ratio)
         : context_(context),
           layer_(layer),
           job_(*layer.job),
           ratio_(ratio),
-          finish_(finish),
           flats_(falling(job_, roughs_layers)),
           balls_(falling(job_, ToolKind::ball)) {
         for (const Flat& flat : layer.flats) floors_.push_back(flat.z);
@@ -183,7 +181,7 @@ private:
             return std::min(ball_level_stepdown(ball.diameter / 2, least, job_.tolerances.cusp),
                             ball.stepdown_max);
         };
-        choice_.tools.finish = finish_ ? *finish_ : first_that_reaches(balls_, "finish", stepdown);
+        choice_.tools.finish = first_that_reaches(balls_, "finish", stepdown);
         const double r = choice_.tools.finish.diameter / 2;
         choice_.record.finish_stepdown = stepdown(choice_.tools.finish);
         choice_.record.finish_stepdown_printed = ball_level_stepdown_printed(r, least, job_.tolerances.cusp);
@@ -378,7 +376,6 @@ private:
     const LayerJob& layer_;
     const Job& job_;
     const ReachRatio ratio_;
-    const std::optional<Tool> finish_;
     std::vector<Tool> flats_, balls_;  // flats_: bull-noses too, which rough as the flats around them
     std::vector<double> floors_;
     std::optional<LayerVoxels> voxels_;
@@ -404,20 +401,22 @@ Overrun overrun_of(const Job& job) {
     return overrun;
 }
 
-std::optional<Tool> next_wider_ball(const Job& job, const Tool& finish) {
+std::optional<LayerTools> with_wider_finish(const Job& job, LayerTools tools) {
     std::optional<Tool> wider;
     for (const Tool& ball : falling(job, ToolKind::ball))
-        if (ball.diameter > finish.diameter + 1e-9) wider = ball;
-    return wider;
+        if (ball.diameter > tools.finish.diameter + 1e-9) wider = ball;
+    if (!wider) return std::nullopt;
+    tools.finish = *wider;
+    tools.rest = rest_tools(job, tools.rough, wider->diameter);
+    return tools;
 }
 
-ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio,
-                        const std::optional<Tool>& finish) {
-    return Chooser(context, layer, ratio, finish).run();
+ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio) {
+    return Chooser(context, layer, ratio).run();
 }
 
 std::vector<LayerTools> with_wider_rough(Context& context, const LayerJob& layer, const LayerTools& tools) {
-    return Chooser(context, layer, {}, {}).wider_rough(tools);
+    return Chooser(context, layer, {}).wider_rough(tools);
 }
 
 std::vector<double> even_levels(double z_top, double z_bottom, std::span<const double> floors,

@@ -17,8 +17,9 @@ struct ToolChoice {
     LayerSelection record;
 };
 
-/// The next larger ball of the library than a finish tool; none for the largest.
-[[nodiscard]] std::optional<Tool> next_wider_ball(const Job& job, const Tool& finish);
+/// A set with the next wider ball of the library as finish tool, and its own where that does not reach; none
+/// where there is no wider one.
+[[nodiscard]] std::optional<LayerTools> with_wider_finish(const Job& job, LayerTools tools);
 
 /// Whether the job's library leaves anything to choose: two flats or two balls, and not the fixed set by
 /// order.
@@ -40,12 +41,9 @@ struct Overrun {
 /// @param ratio asked for balls, from the largest down, and in an upright layer for flats; none: the share of
 /// the sections' length that a
 ///        disc of the tool's radius touches (LayerVoxels::reached_share)
-/// @param finish taken as finish tool whatever it reaches: what it leaves is for the smaller ones where it
-/// lies
 /// @throws Error(usage, "job.tool") when the library lacks a flat or a ball; Error(no_plan, "memory.limit"),
 /// Error(cancelled)
-[[nodiscard]] ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio = {},
-                                      const std::optional<Tool>& finish = {});
+[[nodiscard]] ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio = {});
 
 /// Past print: sets with the same finish tool whose roughing cutter is wider, or as wide and goes deeper, the
 /// widest first; each as deep at once as the finish tool's radius allows at the least slope. What these leave

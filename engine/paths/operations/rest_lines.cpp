@@ -31,7 +31,7 @@ void RestLines::lay() {
     LayerStock::Trial places(stock_);
     lay_lines();
     settle();
-    if (!(pass_.allowance > 0))
+    if (!pass_.followed && !(pass_.allowance > 0))
         probe();  // the pass after one that keeps off the walls is the one for narrow slots
     places.undo();
 }
@@ -344,6 +344,7 @@ void RestLines::keep_what_lowers(std::vector<RestLine>& lines) {
             stock_.cut_at(end_, to_mm(p.x), to_mm(p.y), p.tip);
         }
     }
+    targets_.forget(enough());
 }
 
 }  // namespace slabwright

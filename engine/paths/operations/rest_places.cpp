@@ -56,10 +56,7 @@ bool RestPlaces::lowers(double x, double y, double tip, double slack) const {
     return targets_.any_near(x, y, core + slack, above, [&](int i, int j) {
         const std::size_t c = grid.index(i, j);
         if (stock_.height(c) <= above) return false;
-        // What the pass has brought within its limit is no reason to go there again. Flats leave stairs on
-        // slopes: where they finish, more stands beside a cell's middle than there.
-        const double enough = (pass_.in_steps || ball_ ? 1 : 0.5) * pass_.limit;
-        if (static_cast<double>(stock_.left(c)) <= enough) return false;
+        if (static_cast<double>(stock_.left(c)) <= enough()) return false;
         double z = above;
         if (lowering_.radius > 0) {
             const double from_axis = std::max(0.0, std::hypot(grid.x(i) - x, grid.y(j) - y) - slack);

@@ -37,6 +37,10 @@ protected:
     /// What a cell must lose, mm along the normal, for a place to be visited.
     [[nodiscard]] double worth(std::size_t cell) const;
 
+    /// mm: what the pass has brought within this is no reason to go there again. Flats leave stairs on
+    /// slopes: where they finish, more stands beside a cell's middle than there.
+    [[nodiscard]] double enough() const { return (pass_.in_steps || ball_ ? 1 : 0.5) * pass_.limit; }
+
     /// Whether the cutter, here or up to `slack` mm beside, lowers a cell that is worth it.
     [[nodiscard]] bool lowers(double x, double y, double tip, double slack = 0) const;
 

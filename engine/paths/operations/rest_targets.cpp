@@ -9,6 +9,8 @@ namespace slabwright {
 namespace {
 
 constexpr float kRise = 0.5F;  // mm: a wall that is lower than what stands beside it by less is as high
+constexpr float kLevel = 0.966F,
+                kUpright = 0.259F;  // of a normal, upward: within 15° of level and of upright
 
 }  // namespace
 
@@ -42,6 +44,9 @@ RestTargets::RestTargets(Context& context, const LayerStock& stock, const RestPa
             std::size_t count = 0;
             for (std::size_t r = begin; r < end; ++r)
                 stock.each_left(static_cast<int>(r), pass.limit, [&, j = static_cast<int>(r)](int i) {
+                    if (const float nz = stock.nz(grid.index(i, j));
+                        !pass.on_slopes && nz > kUpright && nz < kLevel)
+                        return;
                     if (reach > 0 && beside_wall(i, j)) return;
                     const double stands = stock.z_bottom() + stock.height(grid.index(i, j));
                     if (probe && probe->stands_over(grid.x(i), grid.y(j), just_under(stands - 1e-3))) return;
@@ -53,6 +58,21 @@ RestTargets::RestTargets(Context& context, const LayerStock& stock, const RestPa
         },
         std::plus<>());
     find_highest(reach_mm);
+}
+
+void RestTargets::forget(double enough) {
+    const CellGrid& grid = stock_.grid();
+    for (std::size_t t = 0; t < tiles_.size(); ++t) {
+        Tile& tile = tiles_[t];
+        tile.highest = kNone;
+        for (std::uint64_t left = tile.marked; left != 0; left &= left - 1) {
+            const int bit = std::countr_zero(left);
+            const std::size_t c = grid.index(static_cast<int>(t % tiles_x_) * kTile + bit % kTile,
+                                             static_cast<int>(t / tiles_x_) * kTile + bit / kTile);
+            if (static_cast<double>(stock_.left(c)) <= enough) tile.marked &= ~(std::uint64_t{1} << bit);
+            else tile.highest = std::max(tile.highest, stock_.height(c));
+        }
+    }
 }
 
 void RestTargets::find_highest(double reach) {

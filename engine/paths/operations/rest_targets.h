@@ -69,6 +69,8 @@ public:
             }
         return false;
     }
+    /// Those of which no more than this (mm along the normal) is left now are not near any more.
+    void forget(double enough);
     [[nodiscard]] std::array<int, 2> rows() const {
         int first = 0, last = stock_.grid().ny - 1;
         while (first <= last && rows_[static_cast<std::size_t>(first)].empty()) ++first;
@@ -87,7 +89,7 @@ private:
     // Of the cells that are marked.
     struct Tile {
         std::uint64_t marked = 0;  // a bit each, eight a row
-        float highest = kNone;     // when they were marked: cutting only lowers them
+        float highest = kNone;     // when they were last looked at: cutting only lowers them
     };
     const LayerStock& stock_;
     std::vector<CellRuns> rows_;
