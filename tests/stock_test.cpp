@@ -21,6 +21,12 @@ double end_height(const CutterEnd& end, double r) {
     return end.form == CutterEnd::Form::cone ? r * end.slope : 0;
 }
 
+struct SatisfiedByAny {
+    std::vector<std::size_t> cells;
+    void operator()(std::size_t cell, double) { cells.push_back(cell); }
+    [[nodiscard]] bool enough() const { return !cells.empty(); }
+};
+
 }  // namespace
 
 TEST(Sweep, AgreesWithBruteForce) {
@@ -128,6 +134,7 @@ TEST(Sweep, LeavesOutWhatStandsLower) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> u(-1, 11), uz(-3, 3), ur(0.4, 4);
     const CellGrid grid{0.1, 0.2, 0.31, 30, 28};
+    const auto row = static_cast<std::size_t>(grid.nx);
     for (int trial = 0; trial < 300; ++trial) {
         const CutterEnd end{static_cast<CutterEnd::Form>(trial % 3), ur(random), 0.6};
         const std::array<double, 3> a{u(random), u(random), uz(random)};
@@ -156,6 +163,14 @@ TEST(Sweep, LeavesOutWhatStandsLower) {
         });
         for (std::size_t c = 0; c < grid.count(); ++c)
             EXPECT_EQ(given[c] != 0, all[c] < bottom + static_cast<double>(heights[c])) << "trial " << trial;
+        // What asks for no more once it has some gets all of the first row that has any.
+        SatisfiedByAny some;
+        sweep_above(grid, end, a, b, StandingHeights{heights.data(), bottom}, some);
+        const auto first = static_cast<std::size_t>(std::find(given.begin(), given.end(), 1) - given.begin());
+        const std::size_t row_end = (first / row + 1) * row;
+        for (std::size_t c = 0; c < grid.count(); ++c)
+            EXPECT_EQ(std::count(some.cells.begin(), some.cells.end(), c), given[c] != 0 && c < row_end)
+                << "trial " << trial;
     }
 }
 

@@ -58,6 +58,27 @@ private:
     LayerStock::Trial trial_;
 };
 
+// Of what is left over the limit, the share that no wall within the swath (mm) rises as high as; by every
+// fourth cell of every fourth row.
+double share_off_walls(const LayerCut& cut, const LayerStock& stock, double limit, double swath) {
+    constexpr int each = 4;
+    const CellGrid& grid = stock.grid();
+    const DropIndex& wall = cut.drops(flat_cutter(swath));
+    MetPoints met;
+    double off = 0, all = 0;  // mm, of height
+    for (int j = 0; j < grid.ny; j += each)
+        stock.each_left(j, limit, [&](int i) {
+            if (i % each != 0) return;
+            const std::size_t c = grid.index(i, j);
+            const double stands = stock.height(c), lowest = stock.surface(c),
+                         top =
+                             wall.drop(grid.x(i), grid.y(j), stock.z_bottom(), &met).tip_z - stock.z_bottom();
+            off += stands - std::clamp(top, lowest, stands);
+            all += stands - lowest;
+        });
+    return all > 0 ? off / all : 0;
+}
+
 // Waste between walls. What lies within the swath of the level contours beside a wall may be left to them,
 // which then meet more and go slower: it is left where that spares this operation most of its time, as along
 // upright walls; where slopes are gentle it spares little or none.
@@ -68,7 +89,10 @@ Operation clear_between(const LayerCut& cut, LayerStock& stock, RestPass pass, d
     constexpr double kLittle = 0.03;  // of the minutes before
     constexpr double kSpared = 0.6;   // of the time without
     const Tool& tool = cut.layer.tools.finish;
-    pass.swath = kSwath * tool.diameter / 2;
+    constexpr double kMostOff = 0.5;  // of the waste: where more is far from walls, little is spared
+    const double swath = kSwath * tool.diameter / 2;
+    if (share_off_walls(cut, stock, pass.limit, swath) > kMostOff) return cut_rest(cut, stock, tool, pass);
+    pass.swath = swath;
     std::optional<Attempt> attempt(std::in_place, cut, stock);
     Operation some = cut_rest(cut, stock, tool, pass);
     const double minutes = minutes_of(some, cut.job.machine);

@@ -41,6 +41,7 @@ struct Over {
     double limit, steep;
     bool more = false;  // more than the limit is left
     bool wall = false;  // the part stands higher than the cutter by more than beside a slope
+    [[nodiscard]] bool enough() const { return more; }
     void operator()(std::size_t cell, double z) {
         const std::size_t c = first + cell;
         more = more || static_cast<double>((height[cell] - stock.surface(c)) * stock.nz(c)) > limit;

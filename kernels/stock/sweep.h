@@ -82,6 +82,13 @@ void take_level(Fn& fn, std::size_t first, int n, double z, const StandingHeight
             if (standing(c) > z) fn(c, z);
 }
 
+/// Whether fn asks for no more cells: fn.enough(), where it has that.
+template <class Fn>
+[[nodiscard]] bool has_enough(const Fn& fn) {
+    if constexpr (requires { fn.enough(); }) return fn.enough();
+    else return false;
+}
+
 /// The first and the last row whose centres lie within [y_low, y_high]; first > last: none.
 inline std::pair<int, int> rows_between(const CellGrid& grid, double y_low, double y_high) {
     const double beyond = grid.ny + 1.0;
@@ -109,6 +116,7 @@ void sweep_level_disc(const CellGrid& grid, double radius, const std::array<doub
         const OverSpans over =
             spans_over(standing.height + row, nx, rows, spans, level_over(standing.bottom, z));
         for (std::uint64_t left = over.left | over.right; left != 0; left &= left - 1) {
+            if (has_enough(fn)) return;
             const auto k = static_cast<std::size_t>(std::countr_zero(left));
             const std::size_t at = row + k * nx;
             if ((over.left >> k & 1) != 0)
@@ -170,6 +178,7 @@ public:
                                   count, spans, level);
             else if (count < RowSpans::kRows) over.left = over.right = (std::uint64_t{1} << count) - 1;
             for (std::uint64_t left = over.left | over.right; left != 0; left &= left - 1) {
+                if (has_enough(fn_)) return;
                 const auto k = static_cast<std::size_t>(std::countr_zero(left));
                 if ((over.left >> k & 1) != 0)
                     along_row(j + static_cast<int>(k), spans.low[k], spans.left[k]);
@@ -372,7 +381,7 @@ private:
 /// Given StandingHeights many cells are compared at once; fn may then take rows of them instead (take_row,
 /// take_level), and of a level disc all spans of many rows, compared or not: fn.spans(cell where the first
 /// row begins, rows, spans, z). A level disc in a chain leaves out what it covers at its begin then, and that
-/// only.
+/// only. Once fn.enough(), no further row is looked at.
 template <class Standing, class Fn>
 void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<double, 3>& from,
                  const std::array<double, 3>& to, Standing&& standing, Fn&& fn,

@@ -114,10 +114,14 @@ public:
             MetPoints met;
             for (std::size_t k = begin; k < end; ++k) {
                 LeftOver& cell = left_over_[k];
-                if (on_floor(grid.index(cell.i, cell.j))) continue;
-                const double tip =
-                    wall.drop(grid.x(cell.i), grid.y(cell.j), stock_.z_bottom() + lowest, &met).tip_z;
-                cell.wall = static_cast<float>(tip - stock_.z_bottom());
+                const std::size_t c = grid.index(cell.i, cell.j);
+                if (on_floor(c)) continue;
+                // Beside a wall as high as what stands there no level has anything of it.
+                const std::optional<Rest> rest =
+                    wall.drop_within(grid.x(cell.i), grid.y(cell.j), stock_.z_bottom() + lowest,
+                                     stock_.z_bottom() + static_cast<double>(stock_.height(c)), &met);
+                cell.wall = rest ? static_cast<float>(rest->tip_z - stock_.z_bottom())
+                                 : std::numeric_limits<float>::infinity();
             }
         });
     }
