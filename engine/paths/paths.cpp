@@ -389,9 +389,21 @@ private:
                        .followed = followed(tools_.finish)}));
         reached(0.94);
         for (const Tool& tool : tools_.rest) cut_narrow(stock, tool, limit);
+        // On slopes what no ball reaches: creases, mostly nothing.
+        for (const Tool& tool : tools_.rest)
+            if (tool.kind == ToolKind::flat && last_of_kind(tool) && ball_follows(tool))
+                narrow_corners(stock, tool, limit, true);
         if (cut_.job.cutting.edges)
             for (Operation& op : follow_edges(cut_, stock)) take(std::move(op));
         result_.left_mm2 = stock.area_over(context_, limit);
+    }
+    void narrow_corners(LayerStock& stock, const Tool& flat, double limit, bool on_slopes) {
+        take(cut_rest(cut_, stock, flat,
+                      {.kind = OperationKind::corner,
+                       .purpose = "narrow corners",
+                       .limit = limit,
+                       .followed = followed(flat),
+                       .on_slopes = on_slopes}));
     }
     void cut_narrow(LayerStock& stock, const Tool& tool, double limit) {
         constexpr double kWorthAChange = 150;  // mm² left, for a tool between others
@@ -404,13 +416,7 @@ private:
         if (contours_ && tool.kind == ToolKind::flat)
             take(semi_rough_layer(cut_, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
         else take(cut_rest(cut_, stock, tool, waste(tool, "waste in narrow places")));
-        if (tool.kind == ToolKind::flat)
-            take(cut_rest(cut_, stock, tool,
-                          {.kind = OperationKind::corner,
-                           .purpose = "narrow corners",
-                           .limit = limit,
-                           .followed = followed(tool),
-                           .on_slopes = !ball_follows(tool)}));
+        if (tool.kind == ToolKind::flat) narrow_corners(stock, tool, limit, !ball_follows(tool));
         else
             take(cut_rest(cut_, stock, tool,
                           {.kind = OperationKind::finish,

@@ -137,11 +137,14 @@ public:
         if (may_widen) {
             // Of the sets planned so far the best, with a wider finish tool, then with a wider roughing
             // cutter.
-            const std::size_t first = sets_.size();
+            std::size_t first = sets_.size();
             if (std::optional<LayerTools> tools = with_wider_finish(fitted_, sets_[chosen_].tools))
                 add("wider", std::move(*tools));
             try_sets(first, finish_at, rough_at);
-            climb(with_wider_rough(context_, work_, sets_[chosen_].tools), rough_at);
+            first = sets_.size();
+            for (LayerTools& tools : with_wider_rough(context_, work_, sets_[chosen_].tools))
+                add("wider rough", std::move(tools));
+            try_sets(first, rough_at, 1);
         }
         if (selecting && compare && best_->strained)
             if (std::optional<LayerTools> stiffer = stiffer_tools(fitted_, sets_[chosen_].tools)) {
@@ -186,17 +189,6 @@ private:
         ToolChoice choice = select_tools(context_, work_, reach_ratio(context_, work_, ground_.scene));
         add("selected", std::move(choice.tools));
         selection_ = std::move(choice.record);
-    }
-
-    // Tries sets from the last to the first for as long as that pays.
-    void climb(std::vector<LayerTools> sets, double from) {
-        const double step = (1 - from) / static_cast<double>(std::max<std::size_t>(1, sets.size()));
-        for (; !sets.empty(); sets.pop_back(), from += step) {
-            const std::size_t first = sets_.size();
-            add("wider rough", std::move(sets.back()));
-            try_sets(first, from, from + step);
-            if (first < sets_.size() && chosen_ != first) return;
-        }
     }
 
     // Plans the sets from `first` on; their share of the progress is [from, to].

@@ -73,7 +73,7 @@ std::vector<Tool> rest_tools(const Job& job, const Tool& rough, double finish_di
     }
     std::stable_sort(rest.begin(), rest.end(), [](const Tool& a, const Tool& b) {
         const double wide = tip_diameter(a), other = tip_diameter(b);
-        return wide != other ? wide > other : has_ball_tip(a.kind) && !has_ball_tip(b.kind);
+        return wide != other ? wide > other : a.kind < b.kind;
     });
     return rest;
 }

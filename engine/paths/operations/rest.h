@@ -22,7 +22,8 @@ struct RestPass {
     double skin =
         0;  ///< mm: what only the cutter's outermost lowers, as thick as this, is no reason to go anywhere
     bool followed = false;  ///< by a narrower cutter of its kind: what no line meets is left to that
-    bool on_slopes = true;  ///< false: what stands on slopes is left to a ball; floors and upright walls only
+    bool on_slopes = true;  ///< false: what stands on slopes or near them is left to a ball; floors and
+                            ///< upright walls only
 };
 
 /// The allowance of semi-roughing in steps, mm: a third of what roughing leaves, no more than a tenth of the

@@ -1,6 +1,8 @@
 #include "engine/paths/operations/rest_targets.h"
 
+#include <atomic>
 #include <functional>
+#include <utility>
 
 #include "kernels/parallel/parallel.h"
 
@@ -37,6 +39,12 @@ RestTargets::RestTargets(Context& context, const LayerStock& stock, const RestPa
         }
         return false;
     };
+    const int nx = (grid.nx + kTile - 1) / kTile, ny = (grid.ny + kTile - 1) / kTile;
+    tiles_x_ = static_cast<std::size_t>(nx);
+    const auto tile = [&](int i, int j) {
+        return static_cast<std::size_t>(j / kTile) * tiles_x_ + static_cast<std::size_t>(i / kTile);
+    };
+    std::vector<char> sloped(pass.on_slopes ? 0 : tiles_x_ * static_cast<std::size_t>(ny), 0);
     constexpr std::size_t grain = 16;  // rows
     count_ = parallel_reduce(
         context, rows_.size(), grain, std::size_t{0},
@@ -45,8 +53,10 @@ RestTargets::RestTargets(Context& context, const LayerStock& stock, const RestPa
             for (std::size_t r = begin; r < end; ++r)
                 stock.each_left(static_cast<int>(r), pass.limit, [&, j = static_cast<int>(r)](int i) {
                     if (const float nz = stock.nz(grid.index(i, j));
-                        !pass.on_slopes && nz > kUpright && nz < kLevel)
+                        !pass.on_slopes && nz > kUpright && nz < kLevel) {
+                        std::atomic_ref(sloped[tile(i, j)]).store(1, std::memory_order_relaxed);
                         return;
+                    }
                     if (reach > 0 && beside_wall(i, j)) return;
                     const double stands = stock.z_bottom() + stock.height(grid.index(i, j));
                     if (probe && probe->stands_over(grid.x(i), grid.y(j), just_under(stands - 1e-3))) return;
@@ -57,7 +67,31 @@ RestTargets::RestTargets(Context& context, const LayerStock& stock, const RestPa
             return count;
         },
         std::plus<>());
+    if (!pass.on_slopes) leave_slopes(sloped);
     find_highest(reach_mm);
+}
+
+void RestTargets::leave_slopes(const std::vector<char>& sloped) {
+    const int nx = static_cast<int>(tiles_x_), ny = static_cast<int>(sloped.size() / tiles_x_);
+    std::vector<char> near = sloped;
+    for (int j = 0; j < ny; ++j)
+        for (int i = 0; i < nx; ++i)
+            if (sloped[static_cast<std::size_t>(j) * tiles_x_ + static_cast<std::size_t>(i)])
+                for (int l = std::max(0, j - 1); l <= std::min(ny - 1, j + 1); ++l)
+                    for (int k = std::max(0, i - 1); k <= std::min(nx - 1, i + 1); ++k)
+                        near[static_cast<std::size_t>(l) * tiles_x_ + static_cast<std::size_t>(k)] = 1;
+    count_ = 0;
+    for (std::size_t j = 0; j < rows_.size(); ++j) {
+        CellRuns kept;
+        for (const auto& [first, last] : rows_[j])
+            for (int i = first; i <= last; ++i) {
+                if (near[j / kTile * tiles_x_ + static_cast<std::size_t>(i / kTile)]) continue;
+                ++count_;
+                if (!kept.empty() && kept.back()[1] + 1 == i) kept.back()[1] = i;
+                else kept.push_back({i, i});
+            }
+        rows_[j] = std::move(kept);
+    }
 }
 
 void RestTargets::forget(double enough) {
@@ -78,8 +112,7 @@ void RestTargets::forget(double enough) {
 void RestTargets::find_highest(double reach) {
     if (count_ == 0) return;
     const CellGrid& grid = stock_.grid();
-    const int nx = (grid.nx + kTile - 1) / kTile, ny = (grid.ny + kTile - 1) / kTile;
-    tiles_x_ = static_cast<std::size_t>(nx);
+    const int nx = static_cast<int>(tiles_x_), ny = (grid.ny + kTile - 1) / kTile;
     tiles_.assign(tiles_x_ * static_cast<std::size_t>(ny), {});
     for (std::size_t j = 0; j < rows_.size(); ++j)
         for (const auto& [first, last] : rows_[j])

@@ -82,6 +82,9 @@ public:
     [[nodiscard]] std::span<const CellRuns> all_rows() const { return rows_; }
 
 private:
+    /// Leaves out the cells of tiles with a slope that is left, and of those beside them: the foot of a
+    /// fillet is level, too.
+    void leave_slopes(const std::vector<char>& sloped);
     void find_highest(double reach);
 
     static constexpr int kTile = 8;  // cells
