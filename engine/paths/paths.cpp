@@ -62,21 +62,32 @@ private:
 // fourth cell of every fourth row.
 double share_off_walls(const LayerCut& cut, const LayerStock& stock, double limit, double swath) {
     constexpr int each = 4;
+    constexpr std::size_t grain = 16;  // of these rows
     const CellGrid& grid = stock.grid();
     const DropIndex& wall = cut.drops(flat_cutter(swath));
-    MetPoints met;
-    double off = 0, all = 0;  // mm, of height
-    for (int j = 0; j < grid.ny; j += each)
-        stock.each_left(j, limit, [&](int i) {
-            if (i % each != 0) return;
-            const std::size_t c = grid.index(i, j);
-            const double stands = stock.height(c), lowest = stock.surface(c),
-                         top =
-                             wall.drop(grid.x(i), grid.y(j), stock.z_bottom(), &met).tip_z - stock.z_bottom();
-            off += stands - std::clamp(top, lowest, stands);
-            all += stands - lowest;
-        });
-    return all > 0 ? off / all : 0;
+    struct Height {
+        double off = 0, all = 0;  // mm, summed over cells
+    };
+    const auto of_rows = [&](std::size_t begin, std::size_t end) {
+        Height height;
+        MetPoints met;
+        for (std::size_t r = begin; r < end; ++r)
+            stock.each_left(static_cast<int>(r) * each, limit, [&, j = static_cast<int>(r) * each](int i) {
+                if (i % each != 0) return;
+                const std::size_t c = grid.index(i, j);
+                const double stands = stock.height(c), lowest = stock.surface(c), bottom = stock.z_bottom();
+                height.all += stands - lowest;
+                if (const std::optional<Rest> rest =
+                        wall.drop_within(grid.x(i), grid.y(j), bottom + lowest, bottom + stands, &met))
+                    height.off += stands - std::clamp(rest->tip_z - bottom, lowest, stands);
+            });
+        return height;
+    };
+    const auto rows = static_cast<std::size_t>((grid.ny + each - 1) / each);
+    const Height sum = parallel_reduce(cut.context, rows, grain, Height{}, of_rows, [](Height a, Height b) {
+        return Height{a.off + b.off, a.all + b.all};
+    });
+    return sum.all > 0 ? sum.off / sum.all : 0;
 }
 
 // Waste between walls. What lies within the swath of the level contours beside a wall may be left to them,
@@ -164,6 +175,9 @@ std::vector<double> floors_of(const LayerJob& layer) {
     return floors;
 }
 
+// After which a set of tools may be given up; places in its LayerPace.
+enum Stage : std::size_t { waste_cleared, levels_cut, projected_cut, all_cut };
+
 // The operations of one layer, one after the other.
 class LayerPaths {
 public:
@@ -208,7 +222,7 @@ public:
         report_no_way_in(cut_, result_);
         for (Operation& op : drill_holes(cut_)) take(std::move(op));
         reached(0.95);
-        if (hopeless(3)) return std::move(result_);
+        if (hopeless(all_cut)) return std::move(result_);
         report_loose(cut_, result_);
         // Last, so that everything before has straight moves only to think of.
         for (Operation& op : result_.operations) {
@@ -253,7 +267,7 @@ private:
         return sum;
     }
     // Notes the pace of the operations so far, which all stay. Whether other tools are too far ahead of them.
-    bool hopeless(std::size_t stage) {
+    bool hopeless(Stage stage) {
         if (!layer_.paced) return false;
         for (; paced_ < result_.operations.size(); ++paced_)
             so_far_ += minutes_of(result_.operations[paced_], cut_.job.machine);
@@ -274,14 +288,14 @@ private:
         reached(0.56);
         done(levels);
         take(std::move(levels));
-        if (hopeless(1)) return;
+        if (hopeless(levels_cut)) return;
         Operation projected = cut_.job.cutting.projection == Projection::offset
                                   ? finish_offsets(cut_, result_.diagnostics)
                                   : finish_raster(cut_, result_.diagnostics);
         reached(0.75);
         done(projected);
         take(std::move(projected));
-        (void)hopeless(2);
+        (void)hopeless(projected_cut);
     }
 
     // What stands decides the rest: waste where the roughing cutter does not fit before the ball finishes,
@@ -289,7 +303,7 @@ private:
     // limit anywhere.
     void finish_by_what_stands(LayerStock& stock) {
         clear_waste(stock);
-        if (hopeless(0)) return;
+        if (hopeless(waste_cleared)) return;
         finish([&](Operation& op) {
             if (stock.cut(context_, op, tools_.finish).few()) op.moves.clear();
         });
