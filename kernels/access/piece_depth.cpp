@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "kernels/access/standing_part.h"
 
@@ -229,60 +230,116 @@ Closest disc_piece_distance(const Point3& a, const Point3& b, double disc, const
     return least_on_piece(a, b, limit, [&](const Point3& c) { return disc_distance(c, disc, tri); });
 }
 
-Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& tri, double radius, double best) {
+namespace {
+
+// Seen from a cylinder's tip, what of a polygon it may meet on its way is the polygon, drawn along the way
+// backwards: a prism. Of a point w of it the depth is min(R - |w_xy|, w_z), which is concave and rises with
+// w_z, so that the prism's faces and edges tell the greatest. On each it has a closed form: where the axis is
+// nearest, or where side and floor are equally deep.
+class DeepestOfPrism {
+public:
+    DeepestOfPrism(double radius, double more_than)
+        : radius_(radius), more_than_(more_than), deepest_{more_than, 0} {}
+
+    [[nodiscard]] bool found() const { return deepest_.depth > more_than_; }
+    [[nodiscard]] Deepest deepest() const { return deepest_; }
+
+    // From w to w + e, of the places t to t + dt of the way.
+    void edge(const Point3& w, const Point3& e, double t, double dt) {
+        if (std::max(w[2], w[2] + e[2]) <= deepest_.depth) return;
+        const double ee = e[0] * e[0] + e[1] * e[1], we = w[0] * e[0] + w[1] * e[1],
+                     ww = w[0] * w[0] + w[1] * w[1];
+        const double nearest = ee > 0 ? std::clamp(-we / ee, 0.0, 1.0) : 0, reach = radius_ - deepest_.depth;
+        if (const Point3 n = along(w, e, nearest); n[0] * n[0] + n[1] * n[1] >= reach * reach) return;
+        const auto look = [&](double s) { take(along(w, e, s), t + s * dt); };
+        look(nearest), look(0), look(1);
+        // (R - w_z)² = |w_xy|² is a quadratic equation.
+        const double over = radius_ - w[2], a = ee - e[2] * e[2], b = we + over * e[2], c = ww - over * over;
+        const double q = -(b + std::copysign(std::sqrt(std::max(0.0, b * b - a * c)), b));
+        for (const double s : {q / a, c / q})
+            if (s > 0 && s < 1) look(s);
+    }
+
+    // The polygon, off its place by `from`, of the place t of the way.
+    void face(const Polygon& polygon, const Point3& from, double t) {
+        Point3 normal{};
+        const Point3 corner = minus(polygon.p[0], from);
+        for (int i = 1; i + 1 < polygon.n; ++i) {
+            const Point3 n = cross(minus(polygon.p[i], polygon.p[0]), minus(polygon.p[i + 1], polygon.p[0]));
+            for (std::size_t k = 0; k < 3; ++k) normal[k] += n[k];
+        }
+        const std::optional<Point3> w = deepest_on_plane(corner, normal);
+        if (!w || !lies_above(*w)) return;
+        bool left = false, right = false;
+        for (int i = 0; i < polygon.n; ++i) {
+            const Point3 &a = polygon.p[i], &b = polygon.p[(i + 1) % polygon.n];
+            const double side =
+                (b[0] - a[0]) * ((*w)[1] + from[1] - a[1]) - (b[1] - a[1]) * ((*w)[0] + from[0] - a[0]);
+            left |= side > 0, right |= side < 0;
+        }
+        if (!(left && right)) take(*w, t);
+    }
+
+    // What an edge from w to w + e sweeps when it is drawn by `back`, which is the whole way.
+    void side(const Point3& w, const Point3& e, const Point3& back) {
+        const std::optional<Point3> p = deepest_on_plane(w, cross(e, back));
+        if (!p || !lies_above(*p)) return;
+        const double x = (*p)[0] - w[0], y = (*p)[1] - w[1], turn = e[0] * back[1] - e[1] * back[0];
+        const double s = (x * back[1] - y * back[0]) / turn, t = (e[0] * y - e[1] * x) / turn;
+        if (s >= 0 && s <= 1 && t >= 0 && t <= 1) take(*p, t);
+    }
+
+private:
+    static Point3 along(const Point3& w, const Point3& e, double s) {
+        return {w[0] + s * e[0], w[1] + s * e[1], w[2] + s * e[2]};
+    }
+    [[nodiscard]] bool lies_above(const Point3& w) const { return w[2] > deepest_.depth; }
+
+    // Uphill from the axis, as far from it as the floor is high over the wall's foot. None of a plane that is
+    // upright but for rounding: what is over its lower edge is over its upper one.
+    [[nodiscard]] std::optional<Point3> deepest_on_plane(const Point3& corner, const Point3& normal) const {
+        constexpr double upright = 1e-9;
+        if (!(std::abs(normal[2]) > upright * std::sqrt(dot(normal, normal)))) return std::nullopt;
+        const double rise_x = -normal[0] / normal[2], rise_y = -normal[1] / normal[2],
+                     rise = std::sqrt(rise_x * rise_x + rise_y * rise_y),
+                     at_axis = corner[2] - corner[0] * rise_x - corner[1] * rise_y;
+        if (at_axis >= radius_ || !(rise > 0)) return Point3{0, 0, at_axis};
+        const double off = (radius_ - at_axis) / (1 + rise);
+        return Point3{off * rise_x / rise, off * rise_y / rise, at_axis + off * rise};
+    }
+
+    void take(const Point3& w, double t) {
+        const double depth = std::min(radius_ - std::sqrt(w[0] * w[0] + w[1] * w[1]), w[2]);
+        if (depth > deepest_.depth) deepest_ = {depth, t};
+    }
+
+    double radius_, more_than_;
+    Deepest deepest_;
+};
+
+}  // namespace
+
+Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& polygon, double radius, double best) {
     double top = -kInfinity;
-    for (int i = 0; i < tri.n; ++i) top = std::max(top, tri.p[i][2]);
-    auto reaches = [&](const Point3& s, const Point3& e, double tip, double depth) {
-        return distance_2d(clip_z(tri, tip + depth, true), {s[0], s[1]}, {e[0], e[1]}) <= radius - depth;
-    };
-    // The largest depth reached with the tip at one height, while its axis is anywhere between s and e.
-    auto deepest_at = [&](const Point3& s, const Point3& e, double tip, double floor) {
-        double low = floor, high = std::min(radius, top - tip);
-        if (high <= low) return floor;
-        if (reaches(s, e, tip, high)) return high;
-        while (high - low > StandingPart::kNumericalError / 4) {
-            const double m = (low + high) / 2;
-            (reaches(s, e, tip, m) ? low : high) = m;
-        }
-        return low;
-    };
-    const double lowest = std::min(a[2], b[2]);
+    for (int i = 0; i < polygon.n; ++i) top = std::max(top, polygon.p[i][2]);
     const double enough = best + StandingPart::kNumericalError;
-    if (std::min(radius, top - lowest) <= enough || !reaches(a, b, lowest, enough)) return {best, 0};
-    if (a[2] == b[2]) {
-        const double depth = deepest_at(a, b, lowest, best);
-        if (depth <= best) return {best, 0};
-        // The place along the piece: the axis there is nearest to what stands above the cylinder's shrunken
-        // floor.
-        const Polygon above = clip_z(tri, lowest + depth, true);
-        double low = 0, high = 1;
-        for (int i = 0; i < 40; ++i) {
-            const double m1 = low + (high - low) / 3, m2 = high - (high - low) / 3;
-            const Point3 p = between(a, b, m1), q = between(a, b, m2);
-            if (distance_2d(above, {p[0], p[1]}, {p[0], p[1]}) <=
-                distance_2d(above, {q[0], q[1]}, {q[0], q[1]}))
-                high = m2;
-            else low = m1;
-        }
-        return {depth, (low + high) / 2};
+    if (std::min(radius, top - std::min(a[2], b[2])) <= enough) return {best, 0};
+    DeepestOfPrism prism(radius, enough);
+    const Point3 back = minus(a, b);
+    const bool moving = a != b;
+    for (int i = 0; i < polygon.n; ++i) {
+        const Point3 &p = polygon.p[i], e = minus(polygon.p[(i + 1) % polygon.n], p), w = minus(p, a);
+        prism.edge(w, e, 0, 0);
+        if (!moving) continue;
+        prism.edge(minus(p, b), e, 1, 0);
+        prism.edge(w, back, 0, 1);
+        prism.side(w, e, back);
     }
-    // A ramp or plunge: the depth is concave along the way, so a search by thirds finds its maximum.
-    auto depth_at = [&](double t) {
-        const Point3 p = between(a, b, t);
-        return deepest_at(p, p, p[2], std::min(0.0, best) - 2 * (StandingPart::kPiece + 1));
-    };
-    double low = 0, high = 1;
-    for (int i = 0; i < 50; ++i) {
-        const double m1 = low + (high - low) / 3, m2 = high - (high - low) / 3;
-        if (depth_at(m1) >= depth_at(m2)) high = m2;
-        else low = m1;
+    if (polygon.n > 2) {
+        prism.face(polygon, a, 0);
+        if (moving) prism.face(polygon, b, 1);
     }
-    Deepest result{best, 0};
-    for (const double t : {0.0, (low + high) / 2, 1.0}) {
-        const double d = depth_at(t);
-        if (d > result.depth) result = {d, t};
-    }
-    return result;
+    return prism.found() ? prism.deepest() : Deepest{best, 0};
 }
 
 }  // namespace slabwright

@@ -65,12 +65,15 @@ struct Closest {
 [[nodiscard]] Closest disc_piece_distance(const Point3& a, const Point3& b, double disc,
                                           const Triangle& triangle, double limit);
 
-/// Largest min(radius − r, z − tip) over a triangle and a piece of the tip's way, if above `best`.
+/// How deep a cylinder comes to stand in a polygon while its tip goes straight from a to b: the largest
+/// min(radius − r, z − tip) of the polygon's points, r from the axis, in closed form. {best, 0} where it is
+/// not above `best` by more than StandingPart::kNumericalError.
+/// @param polygon convex and plane, of the part; @param radius mm
 struct Deepest {
     double depth;
     double t;
 };
-[[nodiscard]] Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& triangle, double radius,
+[[nodiscard]] Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& polygon, double radius,
                                   double best);
 
 }  // namespace slabwright
