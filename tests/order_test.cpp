@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 #include <tuple>
@@ -19,7 +20,85 @@ std::int64_t way(Point2 a, Point2 b) {
     return dx * dx + dy * dy;
 }
 
+double length(const std::vector<Beginning>& order, Point2 from) {
+    double sum = 0;
+    for (const Beginning& b : order) {
+        sum += std::sqrt(static_cast<double>(way(from, b.at)));
+        from = b.end;
+    }
+    return sum;
+}
+
+// Runs that may be made either way, of which some end where they begin.
+std::vector<Beginning> random_ends(std::mt19937& random, std::uint32_t runs, std::int32_t size) {
+    std::uniform_int_distribution<std::int32_t> u(0, size), reach(0, size / 10);
+    std::vector<Beginning> ends;
+    for (std::uint32_t k = 0; k < runs; ++k) {
+        const Point2 a{u(random), u(random)}, b{a.x + reach(random), a.y + reach(random)};
+        if (k % 4 == 0) {
+            ends.push_back({a, a, k, 0});
+            continue;
+        }
+        ends.push_back({a, b, k, 0});
+        ends.push_back({b, a, k, 1});
+    }
+    return ends;
+}
+
 }  // namespace
+
+TEST(ShortenedOrder, VisitsTheSameRunsOnAShorterWay) {
+    std::mt19937 random(test::seed());
+    for (const std::uint32_t runs : {0U, 1U, 2U, 5U, 40U, 600U, 20'000U}) {
+        const std::vector<Beginning> ends = random_ends(random, runs, 1'000'000),
+                                     nearest = nearest_order(ends, runs, {0, 0}),
+                                     order = shortened(nearest, {0, 0});
+        ASSERT_EQ(order.size(), runs);
+        std::vector<char> seen(runs, 0);
+        for (const Beginning& b : order) {
+            ASSERT_FALSE(seen[b.run]++);
+            EXPECT_TRUE(std::any_of(ends.begin(), ends.end(),
+                                    [&](const Beginning& e) {
+                                        return e.run == b.run && e.place == b.place && e.at == b.at &&
+                                               e.end == b.end;
+                                    }) ||
+                        runs > 1000);
+        }
+        EXPECT_LE(length(order, {0, 0}), length(nearest, {0, 0}));
+        if (runs == 600) {
+            EXPECT_LT(length(order, {0, 0}), 0.9 * length(nearest, {0, 0}));
+        }
+    }
+}
+
+// Few runs in all orders and all ways round.
+TEST(ShortenedOrder, IsHardlyLongerThanTheShortest) {
+    std::mt19937 random(test::seed());
+    constexpr std::uint32_t runs = 6;
+    double found = 0, shortest = 0, first = 0;
+    for (int trial = 0; trial < 30; ++trial) {
+        const std::vector<Beginning> ends = random_ends(random, runs, 1'000'000),
+                                     nearest = nearest_order(ends, runs, {0, 0});
+        std::array<std::uint32_t, runs> order{0, 1, 2, 3, 4, 5};
+        double best = 1e300;
+        do
+            for (std::uint32_t ways = 0; ways < 1U << runs; ++ways) {
+                std::vector<Beginning> visits;
+                for (const std::uint32_t run : order)
+                    for (const Beginning& b : ends)
+                        if (b.run == run && b.place == (run % 4 == 0 ? 0 : ways >> run & 1U))
+                            visits.push_back(b);
+                best = std::min(best, length(visits, {0, 0}));
+            }
+        while (std::next_permutation(order.begin(), order.end()));
+        const double length_found = length(shortened(nearest, {0, 0}), {0, 0});
+        EXPECT_GE(length_found, best - 1);
+        found += length_found;
+        shortest += best;
+        first += length(nearest, {0, 0});
+    }
+    EXPECT_LT(found, 1.05 * shortest) << "the nearest one by one: " << first / shortest;
+}
 
 TEST(NearestRuns, AgreesWithBruteForce) {
     const unsigned seed = test::seed();

@@ -1,6 +1,7 @@
 #include "engine/moves/order.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 namespace slabwright {
@@ -87,6 +88,95 @@ std::vector<Beginning> nearest_order(std::vector<Beginning> beginnings, std::siz
         at = next.end;
     }
     return order;
+}
+
+namespace {
+
+double way(Point2 a, Point2 b) {
+    const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y;
+    return std::sqrt(dx * dx + dy * dy);
+}
+
+// Visits one after another, of which the last may end anywhere.
+class Tour {
+public:
+    Tour(std::vector<Beginning> order, Point2 from) : visits_(std::move(order)), from_(from) {}
+
+    // @returns whether something is shorter now. @param window visits that are looked at together
+    bool shorten(std::size_t window) {
+        bool shorter = false;
+        for (std::size_t i = 0; i < visits_.size(); ++i)
+            for (std::size_t j = i; j < std::min(visits_.size(), i + window); ++j)
+                shorter |= turn(i, j) || (j - i < kMoved && move(i, j, window));
+        return shorter;
+    }
+    [[nodiscard]] std::vector<Beginning> visits() && { return std::move(visits_); }
+
+private:
+    static constexpr std::size_t kMoved = 3;  // visits that are moved at once, at most
+    static constexpr double kLess = 1;        // 0.1 µm
+
+    [[nodiscard]] Point2 before(std::size_t i) const { return i == 0 ? from_ : visits_[i - 1].end; }
+    [[nodiscard]] double on_to(Point2 at, std::size_t i) const {
+        return i < visits_.size() ? way(at, visits_[i].at) : 0;
+    }
+    void reverse(std::size_t i, std::size_t j) {
+        const auto first = visits_.begin() + static_cast<std::ptrdiff_t>(i),
+                   last = visits_.begin() + static_cast<std::ptrdiff_t>(j) + 1;
+        std::reverse(first, last);
+        std::for_each(first, last, [](Beginning& b) {
+            if (b.at == b.end) return;
+            std::swap(b.at, b.end);
+            b.place = 1 - b.place;
+        });
+    }
+
+    // The visits i to j the other way round.
+    bool turn(std::size_t i, std::size_t j) {
+        const Point2 a = before(i), b = visits_[i].at, c = visits_[j].end;
+        const double now = way(a, b) + on_to(c, j + 1), then = way(a, c) + on_to(b, j + 1);
+        if (!(then < now - kLess)) return false;
+        reverse(i, j);
+        return true;
+    }
+
+    // The visits i to j to where the way is least longer for them, either way round.
+    bool move(std::size_t i, std::size_t j, std::size_t window) {
+        const Point2 a = before(i), b = visits_[i].at, c = visits_[j].end;
+        const double spared = way(a, b) + on_to(c, j + 1) - on_to(a, j + 1);
+        if (!(spared > kLess)) return false;
+        double least = spared - kLess;
+        std::size_t place = visits_.size() + 1;
+        bool turned = false;
+        const std::size_t low = i > window ? i - window : 0, high = std::min(visits_.size(), j + window);
+        for (std::size_t k = low; k <= high; ++k) {
+            if (k >= i && k <= j + 1) continue;
+            const Point2 p = before(k);
+            const double was = on_to(p, k), straight = way(p, b) + on_to(c, k) - was,
+                         round = way(p, c) + on_to(b, k) - was;
+            if (straight < least) least = straight, place = k, turned = false;
+            if (round < least) least = round, place = k, turned = true;
+        }
+        if (place > visits_.size()) return false;
+        if (turned) reverse(i, j);
+        const auto at = [&](std::size_t k) { return visits_.begin() + static_cast<std::ptrdiff_t>(k); };
+        if (place < i) std::rotate(at(place), at(i), at(j + 1));
+        else std::rotate(at(i), at(j + 1), at(place));
+        return true;
+    }
+
+    std::vector<Beginning> visits_;
+    Point2 from_;
+};
+
+}  // namespace
+
+std::vector<Beginning> shortened(std::vector<Beginning> order, Point2 from) {
+    constexpr std::size_t pairs = 200'000, rounds = 20;
+    const std::size_t window = std::max<std::size_t>(20, pairs / std::max<std::size_t>(1, order.size()));
+    Tour tour(std::move(order), from);
+    for (std::size_t round = 0; round < rounds && tour.shorten(window); ++round) {}
+    return std::move(tour).visits();
 }
 
 }  // namespace slabwright

@@ -43,4 +43,11 @@ private:
 [[nodiscard]] std::vector<Beginning> nearest_order(std::vector<Beginning> beginnings, std::size_t runs,
                                                    Point2 at);
 
+/// The same visits, of runs that may be made either way, in an order in which the ways between them are
+/// shorter: stretches of it are turned, and few visits moved, as long as that shortens the whole by more than
+/// rounding. Of long orders only what is near in the order is looked at together, so that n visits take about
+/// as much time for each, however many they are.
+/// @param from where the first way begins; the last visit may end anywhere
+[[nodiscard]] std::vector<Beginning> shortened(std::vector<Beginning> order, Point2 from);
+
 }  // namespace slabwright

@@ -3,6 +3,7 @@
 #include "engine/paths/operations/levels.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -193,6 +194,10 @@ private:
     double flat_r_, stepdown_, bottom_, least_wall_, flattest_;
 };
 
+double way_between(Point2 a, Point2 b) {
+    return std::hypot(to_mm(std::int64_t{b.x} - a.x), to_mm(std::int64_t{b.y} - a.y));
+}
+
 // Takes stretches that are spared out of what is wanted of a closed contour: all at the ends of what is
 // wanted, others where leaving the contour and coming back takes no longer.
 void spare_long(std::span<const Point2> contour, const std::vector<char>& spared, std::vector<char>& wanted) {
@@ -209,13 +214,64 @@ void spare_long(std::span<const Point2> contour, const std::vector<char>& spared
         const std::size_t first = k;
         double way = 0;
         for (; spared[(start + k) % n] != 0; ++k) {
-            const Point2 a = contour[(start + k - 1) % n], b = contour[(start + k) % n];
-            way += std::hypot(to_mm(std::int64_t{b.x} - a.x), to_mm(std::int64_t{b.y} - a.y));
+            way += way_between(contour[(start + k - 1) % n], contour[(start + k) % n]);
         }
         const bool between = wanted[(start + first - 1) % n] != 0 && wanted[(start + k) % n] != 0;
         if (between && way < kWorthLeaving) continue;
         for (std::size_t i = first; i < k; ++i) wanted[(start + i) % n] = 0;
     }
+}
+
+// Calls fn(first, count) for the stretches of a closed contour on which wanted is `which`, unless that is the
+// whole of it.
+template <class Fn>
+void for_each_stretch(const std::vector<char>& wanted, bool which, Fn&& fn) {
+    const std::size_t n = wanted.size();
+    const auto is = [&](std::size_t k) { return (wanted[k % n] != 0) == which; };
+    std::size_t start = 0;
+    while (start < n && is(start)) ++start;
+    if (start == n) return;
+    for (std::size_t k = start; k < start + n;) {
+        std::size_t end = k;
+        while (end < start + n && is(end)) ++end;
+        if (end > k) fn(k, end - k);
+        k = std::max(end, k + 1);
+    }
+}
+
+// Takes out stretches that are nowhere steeper than `limit_nz`: projected paths make them as well, and a few
+// millimetres here and there take longer to come to than to cut.
+void leave_to_projection(std::span<const float> nz, double limit_nz, std::vector<char>& wanted) {
+    std::vector<std::array<std::size_t, 2>> left;
+    for_each_stretch(wanted, true, [&](std::size_t first, std::size_t count) {
+        for (std::size_t k = first; k < first + count; ++k)
+            if (nz[k % wanted.size()] < limit_nz) return;
+        left.push_back({first, count});
+    });
+    for (const auto& [first, count] : left)
+        for (std::size_t k = first; k < first + count; ++k) wanted[k % wanted.size()] = 0;
+}
+
+// Stays on the contour between stretches, but for the shortest, that are no farther from each other than it
+// takes to leave it and to come back.
+void bridge(std::span<const Point2> contour, std::vector<char>& wanted) {
+    constexpr double longest = 20, shortest = 1;  // mm
+    const std::size_t n = wanted.size();
+    const auto length = [&](std::size_t first, std::size_t last) {
+        double sum = 0;
+        for (std::size_t k = first; k < last && sum <= longest; ++k)
+            sum += way_between(contour[k % n], contour[(k + 1) % n]);
+        return sum;
+    };
+    std::vector<char> long_ones(n, 0);
+    for_each_stretch(wanted, true, [&](std::size_t first, std::size_t count) {
+        if (length(first, first + count - 1) < shortest) return;
+        for (std::size_t k = first; k < first + count; ++k) long_ones[k % n] = 1;
+    });
+    for_each_stretch(long_ones, false, [&](std::size_t first, std::size_t count) {
+        if (length(first + n - 1, first + n + count) > longest) return;
+        for (std::size_t k = first; k < first + count; ++k) wanted[k % n] = 1;
+    });
 }
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -340,7 +396,15 @@ private:
                                                                 tips.tip + r_ * (1 - nz)))
                     wanted[k] = 0;
             }
-            spare_long(std::span(level.points).subspan(first, n), spared, wanted);
+            const auto contour = std::span(level.points).subspan(first, n);
+            if (!cut_.job.cutting.uniform_steps) {
+                const auto nz = std::span(level.nz).subspan(first, n);
+                if (cut_.job.cutting.finish_strategy == FinishStrategy::split && floor == nullptr)
+                    leave_to_projection(nz, std::cos((slopes_.levels_from + slopes_.projection_to) / 2),
+                                        wanted);
+                bridge(contour, wanted);
+            }
+            spare_long(contour, spared, wanted);
             append_level_runs(level, c, to_units(tips.tip), wanted,
                               simplify_tolerance_units(cut_.job.tolerances.gouge), out);
         }

@@ -1,10 +1,13 @@
 // Finishing by a projected raster: the ball is dropped on the surface along parallel lines wherever its
-// contact lies on a slope under 45°. The step-over is chosen for every pass from the slopes under it (FINISH
-// eq. 9).
+// contact lies on a slope under 45°, along narrow bands of such slopes rather than across them. The step-over
+// is chosen for every pass from the slopes under it (FINISH eq. 9).
 #include "engine/paths/operations/raster.h"
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -16,8 +19,10 @@
 #include "engine/paths/runs/feet.h"
 #include "engine/paths/runs/idle_runs.h"
 #include "engine/paths/runs/layer_cut.h"
+#include "engine/stock/layer_stock.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/geometry/vectors.h"
+#include "kernels/parallel/parallel.h"
 
 namespace slabwright {
 
@@ -60,21 +65,78 @@ double seconds_of(const LayerCut& cut, const RasterRuns& runs) {
     return sum;
 }
 
-// Along x, or along y where that is shorter by more than the estimate is worth, and a sample of the lines
-// takes less time too: a line along a fin is run faster than one across it.
-RasterLines chosen_lines(const LayerCut& cut, const RasterFacets& facets, const DropIndex& ball) {
+// Of the cells that more than a cusp stands on, those on shallow slopes of the pattern.
+std::vector<CellRuns> what_stands(const LayerCut& cut, const RasterFacets& facets) {
+    constexpr float on_bottom = 1e-3F;  // mm
+    const LayerStock& stock = *cut.stock;
+    const auto keep_nz = static_cast<float>(std::cos(facets.slopes.projection_to) - 1.0 / 255);
+    std::vector<CellRuns> rows(static_cast<std::size_t>(stock.grid().ny));
+    parallel_each(cut.context, rows.size(), [&](std::size_t j) {
+        CellRuns& row = rows[j];
+        stock.each_left(static_cast<int>(j), cut.job.tolerances.cusp, [&](int i) {
+            const std::size_t c = stock.grid().index(i, static_cast<int>(j));
+            if (stock.nz(c) < keep_nz || stock.surface(c) < on_bottom) return;
+            if (!row.empty() && row.back()[1] + 1 == i) row.back()[1] = i;
+            else row.push_back({i, i});
+        });
+    });
+    return rows;
+}
+
+// Lines over all that the ball is to make, each part of it in its own direction.
+struct Raster {
+    std::optional<LineDirections> directions;  // none: all along x
+    std::vector<RasterLines> lines;
+
+    [[nodiscard]] double mm() const {
+        double sum = 0;
+        for (const RasterLines& of_one : lines) sum += length_mm(of_one);
+        return sum;
+    }
+};
+
+Raster raster_over(const LayerCut& cut, const RasterFacets& facets, std::span<const CellRuns> rows,
+                   LineDirections::Usual usual) {
+    constexpr double worth = 15;  // mm: turns spared along shorter bands are lost on the ways there
+    Raster raster;
+    raster.directions.emplace(cut.context, cut.stock->grid(), rows, facets.radius, usual, worth);
+    for (std::size_t d = 0; d < raster.directions->all().size(); ++d)
+        if (RasterLines lines = raster_lines(cut, facets, *raster.directions, d); !lines.across.empty())
+            raster.lines.push_back(std::move(lines));
+    return raster;
+}
+
+RasterRuns runs_of(const LayerCut& cut, const RasterFacets& facets, const Raster& raster,
+                   const DropIndex& ball) {
+    RasterRuns all;
+    for (const RasterLines& lines : raster.lines) {
+        RasterRuns runs =
+            raster_runs(cut, facets, lines, ball, raster.directions ? &*raster.directions : nullptr);
+        std::move(runs.begin(), runs.end(), std::back_inserter(all));
+    }
+    return all;
+}
+
+// What is no band runs along x, or along y where that is shorter by more than the estimate is worth, and a
+// sample of the lines takes less time too: a line along a fin is run faster than one across it.
+Raster chosen_raster(const LayerCut& cut, const RasterFacets& facets, const DropIndex& ball) {
     constexpr double clearly = 0.95;
     constexpr std::size_t groups = 8, together = 5;
-    RasterLines x = raster_lines(cut, facets, Axis::x);
-    if (cut.job.cutting.uniform_steps) return x;
-    RasterLines y = raster_lines(cut, facets, Axis::y);
-    if (!(length_mm(y) < clearly * length_mm(x))) return x;
-    const auto seconds = [&](const RasterLines& lines) {
-        const RasterLines some = some_of(lines, groups, together);
-        return seconds_of(cut, raster_runs(cut, facets, some, ball)) *
-               static_cast<double>(lines.across.size()) / static_cast<double>(some.across.size());
+    if (cut.stock == nullptr) return {std::nullopt, {raster_lines(cut, facets)}};
+    const std::vector<CellRuns> rows = what_stands(cut, facets);
+    Raster x = raster_over(cut, facets, rows, LineDirections::along_x);
+    Raster y = raster_over(cut, facets, rows, LineDirections::along_y);
+    if (!(y.mm() < clearly * x.mm())) return x;
+    const auto seconds = [&](const Raster& raster) {
+        double sum = 0;
+        for (const RasterLines& lines : raster.lines) {
+            const RasterLines some = some_of(lines, groups, together);
+            sum += seconds_of(cut, raster_runs(cut, facets, some, ball, &*raster.directions)) *
+                   static_cast<double>(lines.across.size()) / static_cast<double>(some.across.size());
+        }
+        return sum;
     };
-    return seconds(y) < clearly * seconds(x) ? y : x;
+    return seconds(y) < clearly * seconds(x) ? std::move(y) : std::move(x);
 }
 
 RasterRuns without_idle(const LayerCut& cut, RasterRuns runs) {
@@ -95,9 +157,13 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const RasterFacets facets = raster_facets(cut);
     if (facets.shallow.empty()) return op;
     const DropIndex& ball = cut.drops(ball_cutter(facets.radius));
-    const RasterLines raster = chosen_lines(cut, facets, ball);
-    op.stepover = raster.widest_mm;
-    if (raster.kept_wide)
+    const Raster raster = chosen_raster(cut, facets, ball);
+    bool kept_wide = false;
+    for (const RasterLines& lines : raster.lines) {
+        op.stepover = std::max(op.stepover, lines.widest_mm);
+        kept_wide |= lines.kept_wide;
+    }
+    if (kept_wide)
         diagnostics.push_back(
             {Severity::warning,
              "finish.stepover_floor",
@@ -109,8 +175,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
                      cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     path.set_surroundings(cut.around(tool, &ball));
-    follow_nearest(
-        path, chained(without_idle(cut, raster_runs(cut, facets, raster, ball)), raster_slide(cut, ball)));
+    follow_nearest(path,
+                   chained(without_idle(cut, runs_of(cut, facets, raster, ball)), raster_slide(cut, ball)));
     path.finish();
     return op;
 }

@@ -1,4 +1,4 @@
-// The lines of a projected raster: along which axis they run, and how far apart they lie.
+// The lines of a projected raster: in which directions they run, and how far apart they lie.
 #pragma once
 
 #include <cstddef>
@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "engine/paths/operations/finish_slopes.h"
+#include "engine/paths/operations/line_directions.h"
 #include "engine/paths/runs/layer_cut.h"
-#include "kernels/cutting/fibres.h"
 
 namespace slabwright {
 
@@ -20,17 +20,23 @@ struct RasterFacets {
     double top = 0;     ///< mm: the rim of the layer's flat top, made by the walls under it, begins there
 };
 
+/// Lines of one direction.
 struct RasterLines {
-    Axis along = Axis::x;
-    std::vector<std::int32_t> across;  ///< where they lie on the other axis, 0.1 µm, ascending
+    std::size_t number = 0;  ///< of their direction
+    LineDirection direction;
+    std::vector<std::int32_t> across;  ///< where they lie across it, 0.1 µm, ascending
     double widest_mm = 0;              ///< the largest step-over
     bool kept_wide = false;            ///< cutting.min_stepover was wider than the cusp allows
     std::vector<bool> apart;           ///< of a sample: whether lines are left out behind this one
-    Fibres reach;  ///< of each line where the ball may touch RasterFacets::made, mm along it
+    std::vector<Spans> reach;          ///< of each line where the ball may touch what is to be made
 };
 
-/// Lines over the facets, the step-overs by FINISH eq. 9, each from the slopes that the ball touches there.
-[[nodiscard]] RasterLines raster_lines(const LayerCut& cut, const RasterFacets& facets, Axis along);
+/// Lines along x over all the facets, the step-overs by FINISH eq. 9, each from the slopes that the ball
+/// touches there.
+[[nodiscard]] RasterLines raster_lines(const LayerCut& cut, const RasterFacets& facets);
+/// The same of one direction over its targets, from the slopes near them.
+[[nodiscard]] RasterLines raster_lines(const LayerCut& cut, const RasterFacets& facets,
+                                       const LineDirections& directions, std::size_t number);
 
 /// About how long it is to run them, mm, with some for the beginning of each stretch.
 [[nodiscard]] double length_mm(const RasterLines& lines);

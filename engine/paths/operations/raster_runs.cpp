@@ -11,6 +11,8 @@
 #include "engine/paths/operations/finish_slopes.h"
 #include "engine/paths/runs/feet.h"
 #include "engine/paths/runs/tolerances.h"
+#include "kernels/cutting/fibres.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -132,19 +134,21 @@ using SampledLine = std::vector<Sample>;
 class ProjectedRaster {
 public:
     ProjectedRaster(const LayerCut& cut, const RasterFacets& facets, const RasterLines& raster,
-                    const DropIndex& ball)
+                    const DropIndex& ball, const LineDirections* directions)
         : cut_(cut),
           facets_(facets),
           raster_(raster),
           ball_(ball),
+          directions_(directions),
           lines_(raster.across),
           r_(facets.radius),
           step_(safe_step(r_, cut.job.tolerances.gouge)),
           mills_(cut, r_, step_) {}
 
     RasterRuns run() {
+        find_ends();
         list_floor_spans();
-        find_unfinished();
+        if (directions_ == nullptr) find_unfinished();  // else among their targets
         lay_samples();
         mark_cut();
         if (!cut_.job.cutting.uniform_steps) lay_between();
@@ -156,17 +160,31 @@ public:
     }
 
 private:
-    template <class T>
-    [[nodiscard]] std::array<T, 2> placed(T u, T v) const {
-        return along_x_ ? std::array{u, v} : std::array{v, u};
+    // x, y, mm
+    [[nodiscard]] std::array<double, 2> placed(double u, double v) const {
+        const LineDirection& d = raster_.direction;
+        return {d.c * u - d.s * v, d.s * u + d.c * v};
+    }
+    [[nodiscard]] Vec3d turned(const Vec3d& p) const {
+        const LineDirection& d = raster_.direction;
+        return {d.c * p[0] + d.s * p[1], d.c * p[1] - d.s * p[0], p[2]};
+    }
+
+    // Where lines lie within the machine's travel.
+    void find_ends() {
+        const std::array<double, 2> x{cut_.low(0, r_), cut_.high(0, r_)},
+            y{cut_.low(1, r_), cut_.high(1, r_)};
+        for (const std::int32_t v : lines_) ends_.push_back(raster_.direction.within(to_mm(v), x, y));
     }
 
     // Where lines pass over floors, ascending by line: what most of a raster would only find to be finished.
     void list_floor_spans() {
         floor_spans_.resize(lines_.size());
         for (const double floor : cut_.floors) {
-            const Fibres over =
-                covering(cut_.context, floor_facets(cut_, floor), kOverFloor, raster_.along, lines_);
+            std::vector<SolidFacet> facets = floor_facets(cut_, floor);
+            for (SolidFacet& f : facets)
+                for (Vec3d& p : f.p) p = turned(p);
+            const Fibres over = covering(cut_.context, facets, kOverFloor, Axis::x, lines_);
             for (std::size_t l = 0; l < lines_.size(); ++l)
                 for (const Forbidden& f : over.line(l)) floor_spans_[l].push_back({f.low, f.high, floor});
         }
@@ -181,15 +199,18 @@ private:
     }
 
     Sample sample(std::int32_t u, std::int32_t v, Met& met) const {
-        const auto [x, y] = placed(to_mm(u), to_mm(v));
+        const std::array<std::int32_t, 2> place = raster_.direction.place(u, v);
+        const double x = to_mm(place[0]), y = to_mm(place[1]);
         const Rest rest = ball_.drop(x, y, -std::numeric_limits<double>::infinity(), &met.ball);
         Sample s;
         s.u = u;
         s.steep = steeper_ && rest.nz < step_nz_;
         s.contact = {x - r_ * rest.nx, y - r_ * rest.ny, rest.contact_z(r_)};
         const double contact = s.contact[2];
-        s.wanted = rest.nz >= keep_nz_ && !rest.on_cap && contact >= cut_.layer.z_bottom - 0.02 &&
-                   contact < facets_.top && rest.tip_z >= cut_.layer.floor_below;
+        s.wanted =
+            rest.nz >= keep_nz_ && !rest.on_cap && contact >= cut_.layer.z_bottom - 0.02 &&
+            contact < facets_.top && rest.tip_z >= cut_.layer.floor_below &&
+            !(directions_ != nullptr && directions_->is_another(raster_.number, s.contact[0], s.contact[1]));
         // Nor is the rim of a finished floor worth a visit: floor and wall make it.
         if (s.wanted && is_floor(contact) && mills_.cover(s.contact[0], s.contact[1], contact, met.flat))
             s.wanted = false;
@@ -244,10 +265,10 @@ private:
         line.push_back(b);
     }
 
-    // The places from one end to the other, 0.1 µm, that the cutter may go to, in steps.
-    [[nodiscard]] Steps steps_within(double low, double high) const {
-        return {static_cast<std::int32_t>(std::ceil(std::max(low, low_limit_) / step_)),
-                static_cast<std::int32_t>(std::floor(std::min(high, high_limit_) / step_))};
+    // The places from one end to the other, 0.1 µm, that the cutter may go to on a line, in steps.
+    [[nodiscard]] Steps steps_within(std::size_t l, double low, double high) const {
+        return {static_cast<std::int32_t>(std::ceil(std::max(low, ends_[l][0] * kUnitsPerMm) / step_)),
+                static_cast<std::int32_t>(std::floor(std::min(high, ends_[l][1] * kUnitsPerMm) / step_))};
     }
 
     // Places on floors that no flat end mill has finished.
@@ -258,7 +279,7 @@ private:
             std::int32_t next = INT32_MIN;
             std::vector<Steps>& own = unfinished_[l];
             for (const FloorSpan& span : floor_spans_[l]) {
-                const auto [first, last] = steps_within(span.low * kUnitsPerMm, span.high * kUnitsPerMm);
+                const auto [first, last] = steps_within(l, span.low * kUnitsPerMm, span.high * kUnitsPerMm);
                 for (std::int32_t k = std::max(first, next); k <= last; ++k) {
                     next = k + 1;
                     const auto [x, y] = placed(to_mm(k * step_), to_mm(lines_[l]));
@@ -276,8 +297,9 @@ private:
     // What the ball may make within its reach of a line, 0.1 µm along it.
     [[nodiscard]] std::vector<Span> spans_of(std::size_t l) const {
         std::vector<Span> spans;
-        for (const Forbidden& f : raster_.reach.line(l))
-            spans.push_back({f.low * kUnitsPerMm, f.high * kUnitsPerMm});
+        for (const auto& [low, high] : raster_.reach[l])
+            spans.push_back({static_cast<double>(low), static_cast<double>(high)});
+        if (directions_ != nullptr) return spans;
         const double reaches = r_ * kUnitsPerMm;
         const auto near =
             std::lower_bound(lines_.begin(), lines_.end(), lines_[l] - to_units(r_)) - lines_.begin();
@@ -298,7 +320,7 @@ private:
             const auto end = floor_spans_[l].end();
             FloorMills::Walk walk;
             for (const Span& span : spans_of(l)) {
-                const auto [first, last] = steps_within(span.low - step_, span.high + step_);
+                const auto [first, last] = steps_within(l, span.low - step_, span.high + step_);
                 for (std::int32_t k = std::max(first, next); k <= last; ++k) {
                     next = k + 1;
                     const double u = to_mm(k * step_);
@@ -393,7 +415,7 @@ private:
                 close();
                 continue;
             }
-            const auto [x, y] = placed(s.u, v);
+            const auto [x, y] = raster_.direction.place(s.u, v);
             append_free(points, {x, y, s.z}, slide_);
             if (s.cut) {
                 last_cut = points.size();
@@ -410,12 +432,12 @@ private:
     const RasterFacets& facets_;
     const RasterLines& raster_;
     const DropIndex& ball_;
+    const LineDirections* directions_;
     const std::vector<std::int32_t>& lines_;
     const double r_;           // mm
     const std::int32_t step_;  // samples stand on multiples of it, so that those of neighbouring lines are
                                // neighbours
     const FloorMills mills_;
-    const bool along_x_ = raster_.along == Axis::x;
     // Steeper than step_nz_ the cusp is kept by the level contours, where both cut everything.
     const double keep_nz_ = std::cos(facets_.slopes.projection_to),
                  step_nz_ = std::cos(facets_.slopes.projection_keep) - 1e-9;
@@ -425,9 +447,8 @@ private:
     const bool walls_ = cut_.job.cutting.finish_strategy != FinishStrategy::split;
     const std::int32_t finest_ = to_units(walls_ ? 0.005 : 0.02);
     const double chord_ = safe_chord_mm(r_, cut_.job.tolerances.gouge);
-    const double low_limit_ = cut_.low(along_x_ ? 0 : 1, r_) * kUnitsPerMm,
-                 high_limit_ = cut_.high(along_x_ ? 0 : 1, r_) * kUnitsPerMm;  // 0.1 µm
     const Slide slide_ = raster_slide(cut_, ball_);
+    std::vector<std::array<double, 2>> ends_;  // of each line, mm along it
     std::vector<std::vector<FloorSpan>> floor_spans_;
     std::vector<std::vector<Steps>> unfinished_;  // by line
     std::vector<SampledLine> samples_;
@@ -444,8 +465,8 @@ Slide raster_slide(const LayerCut& cut, const DropIndex& ball) {
 }
 
 RasterRuns raster_runs(const LayerCut& cut, const RasterFacets& facets, const RasterLines& raster,
-                       const DropIndex& ball) {
-    return ProjectedRaster(cut, facets, raster, ball).run();
+                       const DropIndex& ball, const LineDirections* directions) {
+    return ProjectedRaster(cut, facets, raster, ball, directions).run();
 }
 
 }  // namespace slabwright

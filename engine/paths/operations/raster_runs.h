@@ -17,7 +17,9 @@ using RasterRuns = std::vector<std::vector<PathPoint>>;
 
 /// Runs where the ball has something to make: those on the lines, then those on lines in between, which are
 /// laid where the surface turns faster than the raster follows.
+/// @param directions of the raster, but for places that have lines of another; null: it makes all
 [[nodiscard]] RasterRuns raster_runs(const LayerCut& cut, const RasterFacets& facets,
-                                     const RasterLines& raster, const DropIndex& ball);
+                                     const RasterLines& raster, const DropIndex& ball,
+                                     const LineDirections* directions);
 
 }  // namespace slabwright

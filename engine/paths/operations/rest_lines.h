@@ -7,14 +7,14 @@
 #include <optional>
 #include <vector>
 
-#include "engine/paths/operations/rest_directions.h"
+#include "engine/paths/operations/line_directions.h"
 #include "engine/paths/operations/rest_places.h"
 
 namespace slabwright {
 
 /// Places one after the other. Those that were found off all lines are lines by themselves.
 struct RestLine {
-    std::size_t direction = 0;  // of RestDirections
+    std::size_t direction = 0;  // of LineDirections
     std::int32_t across = 0;    // 0.1 µm
     std::vector<RestPlace> places;
 };
@@ -100,7 +100,7 @@ private:
     // What a place no longer lowers after those before it is not visited.
     void keep_what_lowers(std::vector<RestLine>& lines);
 
-    std::optional<RestDirections> directions_;
+    std::optional<LineDirections> directions_;
 };
 
 }  // namespace slabwright

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/paths/operations/rest.h"
-#include "engine/paths/operations/rest_directions.h"
+#include "engine/paths/operations/line_directions.h"
 #include "engine/paths/operations/rest_targets.h"
 #include "kernels/cutting/drop.h"
 

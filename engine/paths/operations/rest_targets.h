@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "engine/paths/operations/line_directions.h"
 #include "engine/paths/operations/rest.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/parallel/context.h"
@@ -18,9 +19,6 @@ namespace slabwright {
 
 // The greatest number under a height: what stands over it is as high or higher.
 inline double just_under(double z) { return std::nextafter(z, -std::numeric_limits<double>::infinity()); }
-
-/// Of a row of cells, first and last of each run.
-using CellRuns = std::vector<std::array<int, 2>>;
 
 // The cells worth a visit, row by row.
 class RestTargets {

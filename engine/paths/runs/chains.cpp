@@ -138,7 +138,8 @@ std::vector<std::vector<PathPoint>> chained(std::vector<std::vector<PathPoint>> 
 
 void follow_nearest(PathBuilder& path, const std::vector<std::vector<PathPoint>>& chains) {
     const std::size_t left_out = path.left_out();
-    for (const Beginning& next : nearest_order(both_ends(chains), chains.size(), path.at())) {
+    for (const Beginning& next :
+         shortened(nearest_order(both_ends(chains), chains.size(), path.at()), path.at())) {
         std::vector<PathPoint> chain = chains[next.run];
         if (next.place == 1) std::reverse(chain.begin(), chain.end());
         path.follow(chain);

@@ -8,7 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "engine/paths/operations/rest_directions.h"
+#include "engine/paths/operations/line_directions.h"
+#include "kernels/geometry/units.h"
 #include "tests/support/seed.h"
 
 namespace slabwright {
@@ -35,7 +36,7 @@ bool lies_in(const Spans& spans, double along) {
     });
 }
 
-TEST(RestDirections, BandsAreFollowed) {
+TEST(LineDirections, BandsAreFollowed) {
     Context context({.threads = 2});
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> turn(0, std::numbers::pi), offset(-5, 5), wide(0.4, 2);
@@ -46,7 +47,7 @@ TEST(RestDirections, BandsAreFollowed) {
             return std::abs(-s * (x - x0) + c * (y - y0) - at) < w / 2 &&
                    std::abs(c * (x - x0) + s * (y - y0)) < 20;
         });
-        const RestDirections directions(context, kGrid, rows, 3);
+        const LineDirections directions(context, kGrid, rows, 3);
         for (std::size_t d = 0; d < directions.all().size(); ++d) {
             const LineDirection& line = directions.all()[d];
             const double off = std::abs(std::remainder(std::atan2(line.s, line.c) - angle, std::numbers::pi));
@@ -59,18 +60,72 @@ TEST(RestDirections, BandsAreFollowed) {
     }
 }
 
-TEST(RestDirections, WideAreasAreCrossedAlongX) {
+TEST(LineDirections, WideAreasAreCrossedAlongX) {
     Context context({.threads = 2});
     const std::vector<CellRuns> rows =
         rows_of([&](double x, double y) { return std::hypot(x - kGrid.x(200), y - kGrid.y(150)) < 20; });
-    const RestDirections directions(context, kGrid, rows, 3);
+    const LineDirections directions(context, kGrid, rows, 3);
     for (std::size_t d = 1; d < directions.all().size(); ++d)
         EXPECT_GT(directions.across(d)[0], directions.across(d)[1]) << d;
 }
 
+TEST(LineDirections, WideAreasAreCrossedAlongTheUsualAxis) {
+    Context context({.threads = 2});
+    const std::vector<CellRuns> rows =
+        rows_of([&](double x, double y) { return std::hypot(x - kGrid.x(200), y - kGrid.y(150)) < 20; });
+    const LineDirections directions(context, kGrid, rows, 3, LineDirections::along_y);
+    const LineDirection& y = directions.all()[LineDirections::along_y];
+    EXPECT_EQ(y.p, 0);
+    EXPECT_EQ(y.q, 1);
+    for (std::size_t d = 0; d < directions.all().size(); ++d)
+        EXPECT_EQ(directions.across(d)[0] <= directions.across(d)[1], d == LineDirections::along_y) << d;
+}
+
+/// By the directions that the places of single targets have.
+TEST(LineDirections, KnowWhichLinesGoOverAPlaceOrARectangle) {
+    Context context({.threads = 2});
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> x(kGrid.x(0) - 3, kGrid.x(399) + 3),
+        y(kGrid.y(0) - 3, kGrid.y(299) + 3), size(0, 12);
+    const auto is_target = [&](double u, double v) {
+        return std::abs(std::remainder(v + 8 * std::sin(0.5 * u), 15)) < 0.6 && u + v < 60;
+    };
+    const LineDirections directions(context, kGrid, rows_of(is_target), 2.5);
+    std::vector<std::vector<std::uint32_t>> counts;
+    for (std::size_t d = 0; d < directions.all().size(); ++d) counts.push_back(directions.counts(d));
+    std::vector<std::size_t> met(directions.all().size(), 0);
+    for (int trial = 0; trial < 400; ++trial) {
+        const std::array<double, 2> low{x(random), y(random)},
+            high{low[0] + size(random), low[1] + size(random)};
+        std::vector<char> some(directions.all().size(), 0);
+        for (int j = 0; j < kGrid.ny; ++j)
+            for (int i = 0; i < kGrid.nx; ++i) {
+                const double u = kGrid.x(i), v = kGrid.y(j);
+                if (u < low[0] || u > high[0] || v < low[1] || v > high[1] || !is_target(u, v)) continue;
+                std::size_t own = 0, others = 0;
+                for (std::size_t d = 0; d < some.size(); ++d) {
+                    if (directions.is_another(d, u, v)) ++others;
+                    else ++own, some[d] = 1;
+                }
+                ASSERT_EQ(own, 1U) << "a target has lines of one direction";
+                ASSERT_EQ(others, some.size() - 1);
+            }
+        for (std::size_t d = 0; d < some.size(); ++d)
+            if (some[d] != 0) {
+                ++met[d];
+                ASSERT_TRUE(directions.has_some(counts[d], low, high)) << trial << ' ' << d;
+            }
+    }
+    EXPECT_GT(std::count_if(met.begin(), met.end(), [](std::size_t n) { return n > 0; }), 2);
+    // Far from all targets there are none, and no lines.
+    const double far = kGrid.x(399);
+    EXPECT_FALSE(directions.has_some(counts[0], {far, kGrid.y(299)}, {far, kGrid.y(299)}));
+    EXPECT_FALSE(directions.is_another(0, far, kGrid.y(299)));
+}
+
 /// Every target lies in the stretches of all lines of one direction that pass it no farther than the radius,
 /// and nothing else does.
-TEST(RestDirections, StretchesCoverEveryTarget) {
+TEST(LineDirections, StretchesCoverEveryTarget) {
     Context context({.threads = 2});
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> shape(0.2, 1), aside(-1, 1);
@@ -83,7 +138,7 @@ TEST(RestDirections, StretchesCoverEveryTarget) {
             return std::abs(std::remainder(y + a * std::sin(b * x), 15)) < w && x + y < 60;
         };
         const std::vector<CellRuns> rows = rows_of(is_target);
-        const RestDirections directions(context, kGrid, rows, radius);
+        const LineDirections directions(context, kGrid, rows, radius);
         for (std::size_t d = 1; d < directions.all().size(); ++d)
             turned += directions.across(d)[0] <= directions.across(d)[1] ? 1 : 0;
         const std::array<double, 2> ends{-1000, 1000};
@@ -111,7 +166,7 @@ TEST(RestDirections, StretchesCoverEveryTarget) {
     EXPECT_GT(turned, 3U) << "directions of ten trials, but for those along x";
 }
 
-TEST(RestDirections, LinesEndAtTheBorder) {
+TEST(LineDirections, LinesEndAtTheBorder) {
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> place(-40, 40);
     for (const auto& [p, q] : {std::array{1, 0}, {2, 1}, {0, 1}, {-1, 1}}) {

@@ -1,10 +1,11 @@
-#include "engine/paths/operations/rest_directions.h"
+#include "engine/paths/operations/line_directions.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
 
+#include "kernels/geometry/units.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -15,7 +16,7 @@ constexpr double kBlock = 0.25;       // of the radius: the side of a block of c
 constexpr double kCovered = 0.5;      // of the radius: what lies so near to a target goes with it
 constexpr double kLongest = 16;       // radii: lines are no better for being longer
 constexpr int kTile = 4;              // blocks along a tile; those of tiles beside one another count alike
-constexpr double kMuchFarther = 2.5;  // times as far as along x
+constexpr double kMuchFarther = 2.5;  // times as far as along the usual axis
 
 /// Blocks of cells, row by row; few of them are marked.
 class Blocks {
@@ -95,9 +96,10 @@ std::unique_ptr<float[]> reach_along(const Blocks& blocks, const LineDirection& 
     return reach;
 }
 
-/// By block, the number of the direction in which the marks around it reach farthest.
+/// By block, the number of the direction in which the marks around it reach farthest; `none` where none is.
 std::vector<std::uint8_t> farthest(Context& context, const Blocks& blocks,
-                                   std::span<const LineDirection> directions, double radius) {
+                                   std::span<const LineDirection> directions, double radius,
+                                   std::size_t usual, double least, std::uint8_t none) {
     const Blocks covered = blocks.widened(static_cast<int>(std::ceil(kCovered * radius / blocks.mm())));
     const int nx = (blocks.nx() - 1) / kTile + 1, ny = (blocks.ny() - 1) / kTile + 1;
     const auto tile = [&](int i, int j) {
@@ -113,24 +115,26 @@ std::vector<std::uint8_t> farthest(Context& context, const Blocks& blocks,
         far[d].assign(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny), 0);
         for (const std::size_t b : blocks.marked()) far[d][tile_of(b)] += reach[b];
     });
-    std::vector<std::uint8_t> best(far[0].size(), 0);
+    std::vector<float> marks(far[0].size(), 0);
+    for (const std::size_t b : blocks.marked()) ++marks[tile_of(b)];
+    std::vector<std::uint8_t> best(far[0].size(), static_cast<std::uint8_t>(usual));
     for (int j = 0; j < ny; ++j)
         for (int i = 0; i < nx; ++i) {
-            if (far[0][tile(i, j)] == 0) continue;
-            const auto around = [&](std::size_t d) {
+            if (marks[tile(i, j)] == 0) continue;
+            const auto around = [&](const std::vector<float>& of_tiles) {
                 float sum = 0;
                 for (int l = std::max(0, j - 1); l <= std::min(ny - 1, j + 1); ++l)
                     for (int k = std::max(0, i - 1); k <= std::min(nx - 1, i + 1); ++k)
-                        sum += far[d][tile(k, l)];
+                        sum += of_tiles[tile(k, l)];
                 return sum;
             };
-            const float along_x = around(0);
-            float most = static_cast<float>(kMuchFarther) * along_x;
-            for (std::size_t d = 1; d < directions.size(); ++d)
-                if (const float sum = around(d); sum > most)
+            float most = std::max(static_cast<float>(kMuchFarther) * around(far[usual]),
+                                  static_cast<float>(least) * around(marks));
+            for (std::size_t d = 0; d < directions.size(); ++d)
+                if (const float sum = around(far[d]); d != usual && sum > most)
                     most = sum, best[tile(i, j)] = static_cast<std::uint8_t>(d);
         }
-    std::vector<std::uint8_t> of_blocks(blocks.count(), 0);
+    std::vector<std::uint8_t> of_blocks(blocks.count(), none);
     for (const std::size_t b : blocks.marked()) of_blocks[b] = best[tile_of(b)];
     return of_blocks;
 }
@@ -160,23 +164,46 @@ std::array<double, 2> LineDirection::within(double across, const std::array<doub
     return ends;
 }
 
-RestDirections::RestDirections(Context& context, const CellGrid& grid, std::span<const CellRuns> rows,
-                               double radius)
+LineDirections::LineDirections(Context& context, const CellGrid& grid, std::span<const CellRuns> rows,
+                               double radius, Usual usual, double least)
     : grid_(grid) {
     for (const auto& [p, q] : {std::array{1, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 1}, {-1, 2}, {-1, 1}, {-2, 1}}) {
         const double far = std::hypot(p, q);
         directions_.push_back({p, q, p / far, q / far});
     }
     const Blocks blocks(grid, rows, radius);
-    sort_targets(rows, farthest(context, blocks, directions_, radius), blocks.side());
+    side_ = blocks.side();
+    blocks_x_ = static_cast<std::size_t>(blocks.nx());
+    of_blocks_ = farthest(context, blocks, directions_, radius, usual, least, kNone);
+    sort_targets(rows);
 }
 
-double RestDirections::between(std::size_t direction) const {
+std::vector<std::uint32_t> LineDirections::counts(std::size_t direction) const {
+    const std::size_t row = blocks_x_ + 1, rows = of_blocks_.size() / blocks_x_ + 1;
+    std::vector<std::uint32_t> counts(row * rows, 0);
+    for (std::size_t j = 1; j < rows; ++j)
+        for (std::size_t i = 1; i < row; ++i)
+            counts[j * row + i] = counts[j * row + i - 1] + counts[(j - 1) * row + i] -
+                                  counts[(j - 1) * row + i - 1] +
+                                  (of_blocks_[(j - 1) * blocks_x_ + i - 1] == direction ? 1 : 0);
+    return counts;
+}
+
+bool LineDirections::has_some(std::span<const std::uint32_t> counts, const std::array<double, 2>& low,
+                              const std::array<double, 2>& high) const {
+    const auto [i0, j0] = block_of(low[0], low[1]);
+    const auto [i1, j1] = block_of(high[0], high[1]);
+    const auto at = [&](int i, int j) {
+        return counts[static_cast<std::size_t>(j) * (blocks_x_ + 1) + static_cast<std::size_t>(i)];
+    };
+    return at(i1 + 1, j1 + 1) + at(i0, j0) != at(i0, j1 + 1) + at(i1 + 1, j0);
+}
+
+double LineDirections::between(std::size_t direction) const {
     return grid_.cell / std::hypot(directions_[direction].p, directions_[direction].q);
 }
 
-void RestDirections::sort_targets(std::span<const CellRuns> rows,
-                                  const std::vector<std::uint8_t>& direction_of, int side) {
+void LineDirections::sort_targets(std::span<const CellRuns> rows) {
     cells_.resize(directions_.size());
     for (std::size_t d = 0; d < directions_.size(); ++d) {
         const auto [p, q] = std::array{directions_[d].p, directions_[d].q};
@@ -184,12 +211,11 @@ void RestDirections::sort_targets(std::span<const CellRuns> rows,
         const int last = std::max(0, p * (grid_.ny - 1));
         cells_[d].lines.resize(static_cast<std::size_t>(last - cells_[d].first) + 1);
     }
-    const std::size_t blocks_x = static_cast<std::size_t>((grid_.nx - 1) / side) + 1;
     for (int j = 0; j < grid_.ny; ++j)
         for (const auto& [first, last] : rows[static_cast<std::size_t>(j)])
             for (int i = first; i <= last; ++i) {
-                const std::size_t d = direction_of[static_cast<std::size_t>(j / side) * blocks_x +
-                                                   static_cast<std::size_t>(i / side)];
+                const std::size_t d = of_blocks_[static_cast<std::size_t>(j / side_) * blocks_x_ +
+                                                 static_cast<std::size_t>(i / side_)];
                 const auto [p, q] = std::array{directions_[d].p, directions_[d].q};
                 auto& line = cells_[d].lines[static_cast<std::size_t>(p * j - q * i - cells_[d].first)];
                 const int along = p * i + q * j, step = p * p + q * q;
@@ -198,7 +224,7 @@ void RestDirections::sort_targets(std::span<const CellRuns> rows,
             }
 }
 
-std::array<double, 2> RestDirections::across(std::size_t direction) const {
+std::array<double, 2> LineDirections::across(std::size_t direction) const {
     const Cells& cells = cells_[direction];
     const LineDirection& d = directions_[direction];
     const auto has_some = [](const auto& line) { return !line.empty(); };
@@ -212,7 +238,7 @@ std::array<double, 2> RestDirections::across(std::size_t direction) const {
     return {at(first - cells.lines.begin()), at(cells.lines.rend() - last - 1)};
 }
 
-Spans RestDirections::around(std::size_t direction, double across, double radius,
+Spans LineDirections::around(std::size_t direction, double across, double radius,
                              const std::array<double, 2>& ends) const {
     const Cells& cells = cells_[direction];
     const LineDirection& d = directions_[direction];
