@@ -370,7 +370,7 @@ private:
 
     // Waste where the roughing cutter does not fit.
     void clear_waste(LayerStock& stock) {
-        constexpr double kWorthAChange = 1000;  // mm² left, for a tool between others
+        constexpr double worth_a_change = 1000;  // mm² left, for a tool between others
         const double finish_swath = kSwathShare * tools_.finish.diameter;
         for (std::size_t s = 0; s < tools_.semi_rough.size(); ++s)
             semi_rough(stock, tools_.semi_rough[s],
@@ -379,7 +379,7 @@ private:
                            : finish_swath);
         for (const Tool& tool : tools_.rest)
             if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools_.semi_rough.empty() &&
-                stock.area_over(context_, kWaste) > kWorthAChange)
+                stock.area_over(context_, kWaste) > worth_a_change)
                 semi_rough(stock, tool, finish_swath);
         const RestPass between = waste(tools_.finish, "waste between walls");
         take(contours_ ? clear_between(cut_, stock, between, minutes(result_.operations))
@@ -396,11 +396,14 @@ private:
                                          [](const Tool& t) { return t.kind == ToolKind::flat; });
         if (!smaller)
             take(cut_rest(cut_, stock, tools_.rough, {OperationKind::corner, "corners", limit, false}));
-        take(cut_rest(cut_, stock, tools_.finish,
-                      {.kind = OperationKind::finish,
-                       .purpose = "what is left",
-                       .limit = limit,
-                       .followed = followed(tools_.finish)}));
+        // Where much is left the ball did not fit, and a narrower one comes anyway, which takes the little that
+        // this one passed by.
+        if (!followed(tools_.finish) || stock.area_over(context_, limit) < kWorthAChange)
+            take(cut_rest(cut_, stock, tools_.finish,
+                          {.kind = OperationKind::finish,
+                           .purpose = "what is left",
+                           .limit = limit,
+                           .followed = followed(tools_.finish)}));
         reached(0.94);
         for (const Tool& tool : tools_.rest) cut_narrow(stock, tool, limit);
         // On slopes what no ball reaches: creases, mostly nothing.
@@ -419,8 +422,8 @@ private:
                        .followed = followed(flat),
                        .on_slopes = on_slopes}));
     }
+    static constexpr double kWorthAChange = 150;  // mm² left, for a tool between others
     void cut_narrow(LayerStock& stock, const Tool& tool, double limit) {
-        constexpr double kWorthAChange = 150;  // mm² left, for a tool between others
         const double left = stock.area_over(context_, limit);
         if (!last_of_kind(tool) && left < kWorthAChange) return;
         // What a tool between others is for is only seen when it has cut; where that is little it has not.

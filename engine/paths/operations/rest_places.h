@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/paths/operations/rest.h"
 #include "engine/paths/operations/line_directions.h"
+#include "engine/paths/operations/rest.h"
 #include "engine/paths/operations/rest_targets.h"
 #include "kernels/cutting/drop.h"
 
