@@ -33,14 +33,15 @@ struct DrilledHole {
     double around = 0;    ///< mm: of the circle on which an end mill's middle goes down; 0: straight down
 };
 
-/// Minutes of a layer's programs, at the feeds that they are planned with, up to the end of each stage of its
-/// paths: waste cleared, level contours, projected finish, all.
+/// Minutes of a layer's programs and changes of tool, at the feeds that they are planned with, up to the end
+/// of each stage of its paths: waste cleared, level contours, projected finish, all.
 using LayerPace = std::array<double, 4>;
 
 /// What a set of tools has to come near.
 struct PaceAhead {
     LayerPace pace{};   ///< of the best set so far
     LayerPace least{};  ///< share of what that still has to do after each stage that is left to this one, too
+    double times = 1.2;  ///< as long, and it is given up; adapted feeds seldom make up for more
 };
 
 /// A layer's work is a value in and a value out.

@@ -370,6 +370,16 @@ TEST(RestContours, ToolsThatFallTooFarBehindAreGivenUp) {
     ASSERT_LT(first, 0.5 * 1.2 * all) << "else there is no such case";
     EXPECT_FALSE(beside(1 / 1.19, 3, {0, 0, 0, 1}).given_up);
     EXPECT_TRUE(beside(1 / 1.21, 3, {0, 0, 0, 1}).given_up) << "at the end";
+    // What has as much to do afterwards need not be followed so far.
+    const auto alike = [&](double times) {
+        n.layer.ahead = PaceAhead{best.pace, {1, 1, 1, 1}, 1.01};
+        for (double& minutes : n.layer.ahead->pace) minutes -= times * all;
+        return plan_layer_paths(n.context, n.layer);
+    };
+    EXPECT_FALSE(alike(0.005).given_up);
+    const LayerResult alike_behind = alike(0.02);
+    EXPECT_TRUE(alike_behind.given_up);
+    EXPECT_EQ(alike_behind.pace[1], 0) << "given up after the first stage";
 }
 
 // Slots hardly wider than the end mill. Seed 2 has one that is .05 mm wider where it is narrowest: the place

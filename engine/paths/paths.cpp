@@ -269,14 +269,18 @@ private:
     // Notes the pace of the operations so far, which all stay. Whether other tools are too far ahead of them.
     bool hopeless(Stage stage) {
         if (!layer_.paced) return false;
-        for (; paced_ < result_.operations.size(); ++paced_)
-            so_far_ += minutes_of(result_.operations[paced_], cut_.job.machine);
+        const Machine& machine = cut_.job.machine;
+        const std::vector<Operation>& operations = result_.operations;
+        for (; paced_ < operations.size(); ++paced_) {
+            so_far_ += minutes_of(operations[paced_], machine) + machine.spindle_dwell_s / 60;
+            if (paced_ > 0 && operations[paced_].tool != operations[paced_ - 1].tool)
+                so_far_ += machine.tool_change_s / 60;
+        }
         result_.pace[stage] = so_far_;
         if (!layer_.ahead) return false;
-        constexpr double kHopeless = 1.2;  // adapted feeds seldom make up for as much
-        const auto& [ahead, least] = *layer_.ahead;
+        const auto& [ahead, least, times] = *layer_.ahead;
         const double still = least[stage] * (ahead.back() - ahead[stage]);
-        result_.given_up = so_far_ + still > kHopeless * ahead.back();
+        result_.given_up = so_far_ + still > times * ahead.back();
         return result_.given_up;
     }
 

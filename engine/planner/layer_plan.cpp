@@ -43,10 +43,11 @@ bool same(const LayerTools& a, const LayerTools& b) {
 }
 
 // A wider ball finishes in less than the tools ahead, and leaves more to the corners; a narrower roughing
-// cutter leaves less to all that follow.
-LayerPace still_to_do(const LayerTools& tools, const LayerTools& ahead) {
-    if (tools.rough.diameter < ahead.rough.diameter) return {0.2, 0.3, 0.5, 1};
-    return {0.5, 0.6, 0.9, 1};
+// cutter leaves less to all that follow. After a wider one the same tools have as much to do, or more.
+PaceAhead ahead_of(const LayerTools& tools, const LayerTools& best, const LayerPace& pace) {
+    if (tools.rough.diameter < best.rough.diameter) return {pace, {0.2, 0.3, 0.5, 1}};
+    if (same(tools.finish, best.finish)) return {pace, {1, 1, 1, 1}, 1.01};
+    return {pace, {0.5, 0.6, 0.9, 1}};
 }
 
 // A layer as one set of tools makes it, with the forces of its programs and the feeds that they allow.
@@ -232,8 +233,7 @@ private:
         const bool compared = selection_ || sets_.size() > 1;  // else nobody asks for its time
         work_.paced = compared;
         work_.ahead.reset();
-        if (best_ && !best_->strained)
-            work_.ahead = PaceAhead{best_->pace, still_to_do(tools, sets_[chosen_].tools)};
+        if (best_ && !best_->strained) work_.ahead = ahead_of(tools, sets_[chosen_].tools, best_->pace);
         work_.last_steps =
             overhang_ ? last_rough_steps(job, tools.rough, overhang_->largest() + job.bonding.edge_setback,
                                          layer_.z_top - layer_.z_bottom)
