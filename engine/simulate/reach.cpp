@@ -20,6 +20,8 @@ constexpr int kRounds = 30;                 // of settling
 constexpr double kStuck = 0.99;             // of the round before: settling has ended
 constexpr std::size_t kMostPatches = 20000;  // of one tool and point; a dozen to some hundreds are usual
 
+constexpr double kFarthest = std::numeric_limits<double>::infinity();
+
 /// All places of a tool that may be worth trying for one point: for a ball its centre on the upper half
 /// sphere about the point (lower ones are more in the way, higher ones do not cover it); for a flat end mill
 /// the middle of its floor on the disc about the point, at the point's height. A patch is a range of the
@@ -27,9 +29,15 @@ constexpr std::size_t kMostPatches = 20000;  // of one tool and point; a dozen t
 struct Patch {
     double u, v;    // middle: polar angle or distance, azimuth
     double du, dv;  // half the ranges
-    Point3 centre;
-    double spread;   // mm: no place of the patch is farther from its centre
-    double nearest;  // mm from the centre to the nearest obstacle known
+    double out = 0, up = 0,
+           width = 0;  // mm from the point to the middle, aside and up; of the patch for dv = 1
+    double cos_v = 0, sin_v = 0;
+    Point3 centre{};
+    double spread = 0;   // mm: no place of the patch is farther from its centre
+    double nearest = 0;  // mm from the centre to the nearest obstacle known
+    double nearest2 = kFarthest,
+           most2 = kFarthest;  // as Near::Distances, of the obstacles that were looked at
+    std::size_t looked_at = 0;
 };
 
 /// Obstacles about one point, several at once. All places that are asked for lie on the tool's sphere about
@@ -45,6 +53,7 @@ public:
         for (int k = 0; k < 4; ++k) groups_[count_ / kLanes][k][count_ % kLanes] = all[k];
         ++count_;
     }
+    [[nodiscard]] std::size_t count() const { return count_; }
     struct Distances {
         double nearest;  ///< mm² from a place to the nearest obstacle
         double most;  ///< mm² that no place within `spread` of it and as far from the point exceeds, of one
@@ -53,9 +62,11 @@ public:
     /// What lies higher than a ball's centre counts as even with it, and all counts so for a flat end mill.
     /// Of places c and c' as far from the point p, and an obstacle o, |c' − o|² − |c − o|² = 2 (c − c')·(o −
     /// p).
-    [[nodiscard]] Distances distances(const Point3& c, double spread) const {
-        Doubles4 least = Doubles4{} + std::numeric_limits<double>::infinity(), most = least;
-        for (const auto& [x, y, z, off] : groups_) {
+    /// @param first of the obstacles, in their order, that need be looked at
+    [[nodiscard]] Distances distances(const Point3& c, double spread, std::size_t first) const {
+        Doubles4 least = Doubles4{} + kFarthest, most = least;
+        for (std::size_t g = first / kLanes; g < groups_.size(); ++g) {
+            const auto& [x, y, z, off] = groups_[g];
             const Doubles4 dx = c[0] - x, dy = c[1] - y, below = c[2] - z,
                            dz = ball_ ? (below > 0.0 ? below : Doubles4{}) : Doubles4{};
             const Doubles4 d2 = dx * dx + dy * dy + dz * dz, far = d2 + 2 * spread * off;
@@ -191,9 +202,11 @@ public:
     Found run() {
         if (point_[2] + (ball_ ? R_ : 0) < floor_) return Found::held;
         const double u_end = ball_ ? std::acos(std::clamp((floor_ - point_[2]) / R_, 0.0, 1.0)) : R_;
-        for (int k = 0; k < 3; ++k)
-            consider(
-                {u_end / 2, (2 * k + 1) * std::numbers::pi / 3, u_end / 2, std::numbers::pi / 3, {}, 0, 0});
+        for (int k = 0; k < 3; ++k) {
+            Patch third{u_end / 2, (2 * k + 1) * std::numbers::pi / 3, u_end / 2, std::numbers::pi / 3};
+            place_u(third), place_v(third);
+            consider(third);
+        }
         int settlings = 0;
         for (std::size_t patches = 0; !heap_.empty() && patches < kMostPatches; ++patches) {
             std::pop_heap(heap_.begin(), heap_.end(), worse);
@@ -258,22 +271,35 @@ private:
 
     /// Whether one obstacle blocks all of a patch, by what is known now.
     bool hidden(Patch& p) const {
-        const auto [nearest, most] = near_.distances(p.centre, p.spread);
-        p.nearest = std::sqrt(nearest);
+        if (p.looked_at < near_.count()) {
+            const auto [nearest, most] = near_.distances(p.centre, p.spread, p.looked_at);
+            p.nearest2 = std::min(p.nearest2, nearest);
+            p.most2 = std::min(p.most2, most);
+            p.nearest = std::sqrt(p.nearest2);
+            p.looked_at = near_.count();
+        }
         // A flat end mill's places are up to the patch's outer edge from the point.
         const double outer = std::min(p.u + p.du, R_), farther = ball_ ? 0 : outer * outer - p.u * p.u;
-        return p.nearest + p.spread < R_ - kTouch || most + farther < (R_ - kTouch) * (R_ - kTouch);
+        return p.nearest + p.spread < R_ - kTouch || p.most2 + farther < (R_ - kTouch) * (R_ - kTouch);
     }
+
+    /// Of a patch whose u is new.
+    void place_u(Patch& p) const {
+        const double u_most = std::min(p.u + p.du, ball_ ? std::numbers::pi / 2 : R_);
+        const double sine = ball_ ? std::sin(p.u) : p.u;
+        p.out = ball_ ? R_ * sine : p.u;
+        p.up = ball_ ? R_ * std::cos(p.u) : 0;
+        p.width = (ball_ ? std::sin(u_most) : u_most) * sine;
+    }
+    static void place_v(Patch& p) { p.cos_v = std::cos(p.v), p.sin_v = std::sin(p.v); }
 
     /// Puts a patch among those to look at unless it is hidden.
     void consider(Patch p) {
-        const double u_most = std::min(p.u + p.du, ball_ ? std::numbers::pi / 2 : R_),
-                     sine = ball_ ? std::sin(p.u) : p.u, width = (ball_ ? std::sin(u_most) : u_most) * sine,
-                     out = ball_ ? R_ * sine : p.u;
-        p.centre = {point_[0] + out * std::cos(p.v), point_[1] + out * std::sin(p.v),
-                    point_[2] + (ball_ ? R_ * std::cos(p.u) : 0)};
+        p.centre = {point_[0] + p.out * p.cos_v, point_[1] + p.out * p.sin_v, point_[2] + p.up};
         // Of two places: 4 sin²(Δu/2) + 4 sin u₁ sin u₂ sin²(Δv/2).
-        p.spread = (ball_ ? R_ : 1) * std::sqrt(p.du * p.du + width * p.dv * p.dv);
+        p.spread = (ball_ ? R_ : 1) * std::sqrt(p.du * p.du + p.width * p.dv * p.dv);
+        p.nearest2 = p.most2 = p.nearest = kFarthest;
+        p.looked_at = 0;
         if (hidden(p)) return;
         heap_.push_back(p);
         std::push_heap(heap_.begin(), heap_.end(), worse);
@@ -286,9 +312,11 @@ private:
         if (p.du >= across * p.dv) {
             a.du = b.du = p.du / 2;
             a.u -= a.du, b.u += b.du;
+            place_u(a), place_u(b);
         } else {
             a.dv = b.dv = p.dv / 2;
             a.v -= a.dv, b.v += b.dv;
+            place_v(a), place_v(b);
         }
         consider(a);
         consider(b);
