@@ -16,11 +16,12 @@ namespace slabwright {
 namespace {
 
 // Which runs, counted through all levels from the top, wait for which: a run for those on higher levels that
-// lie within `reach` (0.1 µm) of it, some up to four times as far, for they may hold up wood over its cutter.
+// lie within `reach` (0.1 µm) of it, some up to twice as far, for they may hold up wood over its cutter.
 // Of each place only the nearest level above is told; that has waited for those over it.
 class Waiting {
 public:
-    Waiting(const std::vector<std::vector<LevelRun>>& levels, std::int32_t reach) : reach_(reach) {
+    Waiting(const std::vector<std::vector<LevelRun>>& levels, std::int32_t reach)
+        : cell_((reach + kFine - 1) / kFine) {
         for (std::size_t l = 0; l < levels.size(); ++l)
             for (const LevelRun& run : levels[l]) {
                 level_of_.push_back(static_cast<std::uint32_t>(l));
@@ -30,8 +31,8 @@ public:
         for_.assign(level_of_.size(), 0);
         std::vector<std::array<std::uint32_t, 2>> pairs;  // higher run, lower run
         for (const Visit& v : visits_)
-            for (std::int32_t x = v.x - 1; x <= v.x + 1; ++x)
-                for (std::int32_t y = v.y - 1; y <= v.y + 1; ++y) append_above(x, y, v.run, pairs);
+            for (std::int32_t x = v.x - kFine; x <= v.x + kFine; ++x)
+                for (std::int32_t y = v.y - kFine; y <= v.y + kFine; ++y) append_above(x, y, v.run, pairs);
         std::sort(pairs.begin(), pairs.end());
         pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
         starts_.assign(level_of_.size() + 1, 0);
@@ -57,12 +58,12 @@ private:
     };
     void visit(const LevelRun& run) {
         const auto id = static_cast<std::uint32_t>(level_of_.size() - 1);
-        const auto cell = [&](double v) { return static_cast<std::int32_t>(std::floor(v / reach_)); };
+        const auto cell = [&](double v) { return static_cast<std::int32_t>(std::floor(v / cell_)); };
         for (std::size_t k = 0; k < run.points.size(); ++k) {
             const PathPoint &p = run.points[k], &q = run.points[k == 0 ? 0 : k - 1];
             const int steps = 1 + static_cast<int>(std::hypot(static_cast<double>(p.x) - q.x,
                                                               static_cast<double>(p.y) - q.y) /
-                                                   reach_ * 2);
+                                                   cell_ * 2);
             for (int s = 0; s < steps; ++s) {
                 const double t = static_cast<double>(s) / steps;
                 const Visit v{cell(p.x + t * (static_cast<double>(q.x) - p.x)),
@@ -83,7 +84,8 @@ private:
             pairs.push_back({(at - 1)->run, run});
     }
 
-    std::int32_t reach_;
+    static constexpr std::int32_t kFine = 2;  // cells in a reach
+    std::int32_t cell_;                       // 0.1 µm
     std::vector<std::uint32_t> level_of_;
     std::vector<Visit> visits_;
     std::vector<std::uint32_t> for_;             // how many a run waits for
