@@ -65,15 +65,16 @@ double seconds_of(const LayerCut& cut, const RasterRuns& runs) {
     return sum;
 }
 
-// Of the cells that more than a cusp stands on, those on shallow slopes of the pattern.
+// Of the cells that something stands on, those on shallow slopes of the pattern.
 std::vector<CellRuns> what_stands(const LayerCut& cut, const RasterFacets& facets) {
     constexpr float on_bottom = 1e-3F;  // mm
+    const double least = cut.job.tolerances.cusp / 4;  // what is no more is idle where no more stands near it
     const LayerStock& stock = *cut.stock;
     const auto keep_nz = static_cast<float>(std::cos(facets.slopes.projection_to) - 1.0 / 255);
     std::vector<CellRuns> rows(static_cast<std::size_t>(stock.grid().ny));
     parallel_each(cut.context, rows.size(), [&](std::size_t j) {
         CellRuns& row = rows[j];
-        stock.each_left(static_cast<int>(j), cut.job.tolerances.cusp, [&](int i) {
+        stock.each_left(static_cast<int>(j), least, [&](int i) {
             const std::size_t c = stock.grid().index(i, static_cast<int>(j));
             if (stock.nz(c) < keep_nz || stock.surface(c) < on_bottom) return;
             if (!row.empty() && row.back()[1] + 1 == i) row.back()[1] = i;
