@@ -400,8 +400,8 @@ private:
                                          [](const Tool& t) { return t.kind == ToolKind::flat; });
         if (!smaller)
             take(cut_rest(cut_, stock, tools_.rough, {OperationKind::corner, "corners", limit, false}));
-        // Where much is left the ball did not fit, and a narrower one comes anyway, which takes the little that
-        // this one passed by.
+        // Where much is left the ball did not fit, and a narrower one comes anyway, which takes the little
+        // that this one passed by.
         if (!followed(tools_.finish) || stock.area_over(context_, limit) < kWorthAChange)
             take(cut_rest(cut_, stock, tools_.finish,
                           {.kind = OperationKind::finish,

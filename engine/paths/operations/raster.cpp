@@ -67,7 +67,7 @@ double seconds_of(const LayerCut& cut, const RasterRuns& runs) {
 
 // Of the cells that something stands on, those on shallow slopes of the pattern.
 std::vector<CellRuns> what_stands(const LayerCut& cut, const RasterFacets& facets) {
-    constexpr float on_bottom = 1e-3F;  // mm
+    constexpr float on_bottom = 1e-3F;                 // mm
     const double least = cut.job.tolerances.cusp / 4;  // what is no more is idle where no more stands near it
     const LayerStock& stock = *cut.stock;
     const auto keep_nz = static_cast<float>(std::cos(facets.slopes.projection_to) - 1.0 / 255);
