@@ -308,7 +308,10 @@ struct ToolSelection {
     double overlap_weight = 2;  ///< W of the printed AR
     RoughLimit rough_limit = RoughLimit::smaller;
     bool semi_rough = true;
-    bool compare = true;  ///< plan each layer with the fixed set as well, and keep what is faster
+    bool compare = true;  ///< lay the paths of several sets of tools, and keep what is fastest
+    /// Of sets to be compared those are planned whole that are foreseen to be the fastest; else all are, the
+    /// fixed set first.
+    bool foresee = true;
     double voxel = 0.25;  ///< mm, for AS
 };
 

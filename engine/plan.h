@@ -100,13 +100,17 @@ struct ToolCandidate {
     std::optional<double> accessibility;   ///< AR, 0 … 1; none where it was not asked for
     std::optional<double> semi_rough_mm2;  ///< AS
     std::optional<double> stepdown;        ///< mm
-    std::optional<double> minutes;         ///< by LUO's formulas, of all operations that this choice changes
+    /// By LUO's formulas, of all operations that this choice changes; of a finish tool what finishing is
+    /// foreseen to take, where sets were compared by that.
+    std::optional<double> minutes;
     std::string reason;                    ///< why it was chosen or not, in words
 };
 
 /// A set of tools that a layer was planned with.
 struct ToolSet {
-    std::string name;        ///< "selected", "wider" (the next wider finish tool), "fixed" or "wider rough"
+    /// "selected" (LUO's choice), "fixed", "foreseen" (the fixed set with the ball that is foreseen to be the
+    /// fastest), "wider" or "narrower" (another finish tool), "wider rough" or "stiffer".
+    std::string name;
     std::vector<int> tools;  ///< numbers, in the order of their first cut
     double minutes = 0;  ///< of its programs, tool changes within the layer included; of the first of them
                          ///< where it was given up

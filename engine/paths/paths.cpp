@@ -178,33 +178,36 @@ std::vector<double> floors_of(const LayerJob& layer) {
 // After which a set of tools may be given up; places in its LayerPace.
 enum Stage : std::size_t { waste_cleared, levels_cut, projected_cut, all_cut };
 
+}  // namespace
+
 // The operations of one layer, one after the other.
-class LayerPaths {
+class LayerPaths::Steps {
 public:
-    LayerPaths(Context& context, const LayerJob& layer)
+    Steps(Context& context, LayerJob layer)
         : context_(context),
-          layer_(layer),
-          tools_(layer.tools),
+          layer_(std::move(layer)),
+          tools_(layer_.tools),
           cut_{context,
-               layer,
-               *layer.job,
-               layer_solid(context, layer.mesh, layer.floor_below, layer.z_top),
-               layer.z_bottom + layer.slab_thickness,
-               floors_of(layer),
-               alpha_map(context, layer.mesh, layer.floor_below, layer.z_top),
+               layer_,
+               *layer_.job,
+               layer_solid(context, layer_.mesh, layer_.floor_below, layer_.z_top),
+               layer_.z_bottom + layer_.slab_thickness,
+               floors_of(layer_),
+               alpha_map(context, layer_.mesh, layer_.floor_below, layer_.z_top),
                nullptr,
                {}},
-          standing_(layer.stock_min, layer.stock_max, std::min(cut_.stock_top, layer.z_top),
+          standing_(layer_.stock_min, layer_.stock_max, std::min(cut_.stock_top, layer_.z_top),
                     thinnest_radius(tools_)) {
         cut_.standing = &standing_;
         const double facets_mm2 = static_cast<double>(cut_.solid.facets.size()) /
-                                  std::max(1.0, (layer.stock_max[0] - layer.stock_min[0]) *
-                                                    (layer.stock_max[1] - layer.stock_min[1]));
+                                  std::max(1.0, (layer_.stock_max[0] - layer_.stock_min[0]) *
+                                                    (layer_.stock_max[1] - layer_.stock_min[1]));
         const double levels_against_rest = 0.25 + 0.6 * facets_mm2;
         levels_share_ = levels_against_rest / (1 + levels_against_rest);
     }
 
-    LayerResult run() {
+    bool clear(ProgressPart* progress, const std::optional<PaceAhead>& ahead) {
+        layer_.progress = progress, layer_.ahead = ahead;
         if (!cut_.job.cutting.uniform_steps) take_stock();
         take(face_layer(cut_));
         reached(0.01);
@@ -216,8 +219,14 @@ public:
             drop_idle();
         }
         reached(0.24);
+        return !hopeless(waste_cleared, layer_.ahead ? waste_mm3() : 0) &&
+               (!stock_ || clear_waste(*stock_)) && !hopeless(waste_cleared);
+    }
+
+    LayerResult finish(ProgressPart* progress, const std::optional<PaceAhead>& ahead) {
+        layer_.progress = progress, layer_.ahead = ahead;
         if (stock_) finish_by_what_stands(*stock_);
-        else finish([](const Operation&) {});
+        else finish_slopes([](const Operation&) {});
         if (result_.given_up) return std::move(result_);
         report_no_way_in(cut_, result_);
         for (Operation& op : drill_holes(cut_)) take(std::move(op));
@@ -234,9 +243,12 @@ public:
         return std::move(result_);
     }
 
-    LayerPaths(const LayerPaths&) = delete;
-    LayerPaths& operator=(const LayerPaths&) = delete;
-    ~LayerPaths() {
+    [[nodiscard]] const LayerResult& so_far() const { return result_; }
+    [[nodiscard]] double waste_mm3() const { return stock_ ? stock_->volume_over(context_, kWaste) : 0; }
+
+    Steps(const Steps&) = delete;
+    Steps& operator=(const Steps&) = delete;
+    ~Steps() {
         if (!stock_) return;
         *memory_ = std::move(*stock_).release();  // left to the next layer, however this one ends
         if (layer_.stock_memory != nullptr) layer_.stock_memory->give(std::move(memory_));
@@ -266,8 +278,9 @@ private:
         for (const Operation& op : operations) sum += minutes_of(op, cut_.job.machine);
         return sum;
     }
-    // Notes the pace of the operations so far, which all stay. Whether other tools are too far ahead of them.
-    bool hopeless(Stage stage) {
+    // Notes the pace of the operations so far, which all stay. Whether other tools are too far ahead of them,
+    // who have no waste left to clear where there is some here.
+    bool hopeless(Stage stage, double waste = 0) {
         if (!layer_.paced) return false;
         const Machine& machine = cut_.job.machine;
         const std::vector<Operation>& operations = result_.operations;
@@ -280,13 +293,13 @@ private:
         if (!layer_.ahead) return false;
         const auto& [ahead, least, times] = *layer_.ahead;
         const double still = least[stage] * (ahead.back() - ahead[stage]);
-        result_.given_up = so_far_ + still > times * ahead.back();
+        result_.given_up = so_far_ + kWasteMinutes * waste + still > times * ahead.back();
         return result_.given_up;
     }
 
     // Slopes by level contours and by lines projected on them. @param done(operation) may strike its moves
     template <class Done>
-    void finish(Done&& done) {
+    void finish_slopes(Done&& done) {
         Operation levels = finish_levels(cut_, result_.diagnostics);
         levels_done_ = true;
         reached(0.56);
@@ -302,13 +315,10 @@ private:
         (void)hopeless(projected_cut);
     }
 
-    // What stands decides the rest: waste where the roughing cutter does not fit before the ball finishes,
-    // and after it the corners that the ball leaves, by the flat end mill, and what is left of the cusps'
-    // limit anywhere.
+    // What stands decides the rest: after the ball the corners that it leaves, by the flat end mill, and what
+    // is left of the cusps' limit anywhere.
     void finish_by_what_stands(LayerStock& stock) {
-        clear_waste(stock);
-        if (hopeless(waste_cleared)) return;
-        finish([&](Operation& op) {
+        finish_slopes([&](Operation& op) {
             if (stock.cut(context_, op, tools_.finish).few()) op.moves.clear();
         });
         if (!result_.given_up) cut_corners(stock);
@@ -372,8 +382,8 @@ private:
                            [](const Tool& t) { return has_ball_tip(t.kind); });
     }
 
-    // Waste where the roughing cutter does not fit.
-    void clear_waste(LayerStock& stock) {
+    // Waste where the roughing cutter does not fit. @returns false where it was given up
+    bool clear_waste(LayerStock& stock) {
         constexpr double worth_a_change = 1000;  // mm² left, for a tool between others
         const double finish_swath = kSwathShare * tools_.finish.diameter;
         for (std::size_t s = 0; s < tools_.semi_rough.size(); ++s)
@@ -385,10 +395,12 @@ private:
             if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools_.semi_rough.empty() &&
                 stock.area_over(context_, kWaste) > worth_a_change)
                 semi_rough(stock, tool, finish_swath);
+        if (hopeless(waste_cleared)) return false;
         const RestPass between = waste(tools_.finish, "waste between walls");
         take(contours_ ? clear_between(cut_, stock, between, minutes(result_.operations))
                        : cut_rest(cut_, stock, tools_.finish, between));
         reached(0.56);
+        return true;
     }
 
     // Corners, what is left, and narrow places, by ever smaller tools.
@@ -450,7 +462,7 @@ private:
     }
 
     Context& context_;
-    const LayerJob& layer_;
+    LayerJob layer_;
     const LayerTools& tools_;
     LayerCut cut_;
     std::unique_ptr<StockMemory> memory_;
@@ -465,10 +477,25 @@ private:
     LayerResult result_;
 };
 
-}  // namespace
+LayerPaths::LayerPaths(Context& context, LayerJob layer)
+    : steps_(std::make_unique<Steps>(context, std::move(layer))) {}
+LayerPaths::LayerPaths(LayerPaths&&) noexcept = default;
+LayerPaths& LayerPaths::operator=(LayerPaths&&) noexcept = default;
+LayerPaths::~LayerPaths() = default;
+
+bool LayerPaths::clear(ProgressPart* progress, const std::optional<PaceAhead>& ahead) {
+    return steps_->clear(progress, ahead);
+}
+const LayerResult& LayerPaths::so_far() const { return steps_->so_far(); }
+double LayerPaths::waste_mm3() const { return steps_->waste_mm3(); }
+LayerResult LayerPaths::finish(ProgressPart* progress, const std::optional<PaceAhead>& ahead) {
+    return steps_->finish(progress, ahead);
+}
 
 LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
-    return LayerPaths(context, layer).run();
+    LayerPaths paths(context, layer);
+    if (!paths.clear(layer.progress, layer.ahead)) return paths.so_far();
+    return paths.finish(layer.progress, layer.ahead);
 }
 
 }  // namespace slabwright

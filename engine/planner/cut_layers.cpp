@@ -145,10 +145,14 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
     for (const Tool& t : plan.job.tools) thinnest = std::min(thinnest, t.diameter);
     constexpr std::uint64_t stands =
         3;  // what stands, and two earlier states of it while one way of cutting is held against another
-    return held * (sizeof(SolidFacet) + 16 + 3 * sizeof(Index3)) +
+    const ToolSelection& how = plan.job.selection;
+    // One set of tools that leads, and one that is held against it.
+    const std::uint64_t sets = selects_tools(plan.job) && how.compare && how.foresee ? 2 : 1;
+    return sets * held * (sizeof(SolidFacet) + 16 + 3 * sizeof(Index3)) +
            static_cast<std::uint64_t>(3 * plan_view_mm2(plan)) * (sizeof(Move) + 64) +
-           (stands * Standing::bytes(plan.stock_min, plan.stock_max, thinnest / 2) +
-            LayerStock::bytes(plan.job, plan_view_mm2(plan))) *
+           sets *
+               (stands * Standing::bytes(plan.stock_min, plan.stock_max, thinnest / 2) +
+                LayerStock::bytes(plan.job, plan_view_mm2(plan))) *
                at_once;
 }
 

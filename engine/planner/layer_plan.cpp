@@ -7,27 +7,24 @@
 
 #include <fmt/format.h>
 
-#include "engine/forces/min_material.h"
-#include "engine/forces/op_forces.h"
 #include "engine/moves/motion_time.h"
 #include "engine/paths/paths.h"
-#include "engine/schedule/standing_walls.h"
+#include "engine/planner/layer_trials.h"
+#include "engine/tool_choice/foreseen_finish.h"
 #include "engine/tool_choice/reach_ratio.h"
 #include "engine/tool_choice/select.h"
-#include "kernels/mesh/part.h"
 
 namespace slabwright {
 
 namespace {
 
-constexpr double kSelectionShare = 0.3;  // of a layer's work, where its tools are chosen
-constexpr double kStrained = 1.03;       // of a limit: within that, what a plan states may hold
-constexpr double kFirstSetsShare =
-    0.5;  // of what then remains, the sets of the choice; those that they lead to take the rest,
-constexpr double kWiderFinishShare = 0.25;  // a wider finish tool this
-
-// None may leave more than the first set, but for what differently fine cells see.
-constexpr double kMore = 1.1, kFew = 5;  // mm²
+// Shares of a layer's work, where its tools are chosen: of all,
+constexpr double kSelectionShare = 0.3;
+// of what then remains, where all sets are planned: the sets of the choice, then one with a wider finish
+// tool;
+constexpr double kFirstSetsShare = 0.5, kWiderFinishShare = 0.25;
+// and where the best is foreseen: clearing by each set, then finishing by one.
+constexpr double kClearingShare = 0.5, kFinishingShare = 0.4;
 
 bool same(const Tool& a, const Tool& b) {
     return a.number == b.number && a.stepdown_min == b.stepdown_min && a.stepdown_max == b.stepdown_max;
@@ -50,43 +47,9 @@ PaceAhead ahead_of(const LayerTools& tools, const LayerTools& best, const LayerP
     return {pace, {0.5, 0.6, 0.9, 1}};
 }
 
-// A layer as one set of tools makes it, with the forces of its programs and the feeds that they allow.
-struct Trial {
-    PlannedLayer planned;
-    double minutes = 0;  // of its programs and the changes of tool between them, where it is asked for
-    LayerPace pace{};    // where it is asked for
-    bool floors_slowed = false;      // what thin walls bear made its floors take notably longer
-    std::optional<double> left_mm2;  // none: given up before all its paths were planned
-    bool leaves_more = false;        // than the first set
-    bool whole = true;               // false: given up, its feeds were not adapted
-    bool strained = false;           // cutter, spindle or a thin wall bear more than they may
-};
-
-// Of the programs of finish_floors.
-double floor_minutes(const Layer& layer, const Machine& machine) {
-    double minutes = 0;
-    for (const Operation& op : layer.operations)
-        if (op.purpose == "floors") minutes += motion_time(op.moves, machine, op.blend).minutes;
-    return minutes;
-}
-
-double minutes_of(const Layer& layer, const Machine& machine) {
-    double minutes = 0;
-    const Operation* before = nullptr;
-    for (const Operation& op : layer.operations) {
-        minutes += motion_time(op.moves, machine, op.blend).minutes + machine.spindle_dwell_s / 60;
-        if (before && before->tool != op.tool) minutes += machine.tool_change_s / 60;
-        if (before && !before->moves.empty() && !op.moves.empty())
-            minutes +=
-                approach_seconds(place_of(before->moves.back()), place_of(op.moves.front()), machine) / 60;
-        before = &op;
-    }
-    return minutes;
-}
-
-std::vector<int> tools_in_order(const Layer& layer) {
+std::vector<int> tools_in_order(const std::vector<Operation>& operations) {
     std::vector<int> tools;
-    for (const Operation& op : layer.operations)
+    for (const Operation& op : operations)
         if (std::find(tools.begin(), tools.end(), op.tool) == tools.end()) tools.push_back(op.tool);
     return tools;
 }
@@ -94,66 +57,32 @@ std::vector<int> tools_in_order(const Layer& layer) {
 class LayerPlanner {
 public:
     LayerPlanner(Context& context, const LayerGround& ground, std::size_t index, ProgressPart& progress)
-        : context_(context),
-          ground_(ground),
-          layer_(ground.plan.layers[index]),
-          fitted_(with_tools_for(ground.plan.job, layer_.z_top - layer_.z_bottom)),
-          overrun_(overrun_of(ground.plan.job)),
-          progress_(progress) {
-        const Plan& plan = ground.plan;
-        near_ = part_between(context, ground.mesh, layer_.z_bottom - std::max(overrun_.below, overrun_.board),
-                             layer_.z_top);
-        work_.mesh = near_.view();
-        work_.job = &fitted_;
-        work_.z_bottom = layer_.z_bottom;
-        work_.z_top = layer_.z_top;
-        work_.slab_thickness = layer_.slab_thickness;
-        const Blank slab = slab_of(plan, layer_);
-        work_.stock_min = slab.min;
-        work_.stock_max = slab.max;
-        work_.index = layer_.index;
-        work_.stock_memory = ground.stock_memory;
-        if (ground.drilled != nullptr) work_.drilled = *ground.drilled;
-        if (plan.flask) work_.opening = plan.flask->inner[index];
-        fitted_.tolerances.gouge -= ground.mesh_gap;
-        work_.flats = flats_between(layer_.z_bottom);
-        work_.floor_below = layer_.z_bottom - (ground.carried_by ? overrun_.below : overrun_.board);
-        if (ground.carried_by) overhang_ = overhang_map({&ground.carried_by, 1}, slab.min, slab.max);
-        if (!ground.walls.empty())
-            walls_.emplace(ground.walls, plan.job.material.strength_mpa, widest_beside_walls(plan.job),
-                           plan.job.cutting.wall_allowance);
-    }
+        : context_(context), ground_(ground), trials_(context, ground, index), progress_(progress) {}
 
     PlannedLayer run() {
-        const bool selecting = selects_tools(ground_.plan.job), compare = fitted_.selection.compare;
-        // First, so that the others are measured by it.
-        if (!selecting || compare) add("fixed", fixed_tools(fitted_));
-        if (selecting) choose();
-        const bool may_widen = selecting && compare && !selection_->vertical;
-        const double chosen_at = selecting ? kSelectionShare : 0, rest = 1 - chosen_at,
-                     finish_at = may_widen ? chosen_at + kFirstSetsShare * rest : 1,
-                     rough_at = may_widen ? finish_at + kWiderFinishShare * rest : 1;
-        progress_.reach(chosen_at);
-        try_sets(0, chosen_at, finish_at);
-        if (may_widen) {
-            // Of the sets planned so far the best, with a wider finish tool, then with a wider roughing
-            // cutter.
-            std::size_t first = sets_.size();
-            if (std::optional<LayerTools> tools = with_wider_finish(fitted_, sets_[chosen_].tools))
-                add("wider", std::move(*tools));
-            try_sets(first, finish_at, rough_at);
-            first = sets_.size();
-            for (LayerTools& tools : with_wider_rough(context_, work_, sets_[chosen_].tools))
-                add("wider rough", std::move(tools));
-            try_sets(first, rough_at, 1);
-        }
-        if (selecting && compare && best_->strained)
-            if (std::optional<LayerTools> stiffer = stiffer_tools(fitted_, sets_[chosen_].tools)) {
-                const std::size_t first = sets_.size();
-                add("stiffer", std::move(*stiffer));
-                try_sets(first, 1, 1);
+        const bool selecting = selects_tools(ground_.plan.job);
+        const ToolSelection& how = trials_.job().selection;
+        if (!selecting) {
+            add("fixed", fixed_tools(trials_.job()));
+            try_sets(0, 0, 1);
+        } else {
+            trials_.compare();
+            ToolChoice choice = select_tools(context_, trials_.layer(),
+                                             reach_ratio(context_, trials_.layer(), ground_.scene));
+            selection_ = std::move(choice.record);
+            progress_.reach(kSelectionShare);
+            if (!how.compare) {
+                add("selected", std::move(choice.tools));
+                try_sets(0, kSelectionShare, 1);
+            } else if (how.foresee) {
+                follow_the_foreseen(choice.tools);
+                hold();
+            } else {
+                plan_all(std::move(choice.tools));
+                hold();
             }
-        if (selection_) give_reasons();
+            give_reasons();
+        }
         best_->planned.layer.selection = std::move(selection_);
         progress_.reach(1);
         return std::move(best_->planned);
@@ -163,6 +92,8 @@ private:
     struct NamedSet {
         std::string name;
         LayerTools tools;
+        bool tried = false, strained = false;
+        ToolSet record{};  // of what was tried
     };
 
     // To be tried, unless it is among them.
@@ -171,126 +102,168 @@ private:
             sets_.push_back({name, std::move(tools)});
     }
 
-    // Flats between z and the layer's top.
-    [[nodiscard]] std::vector<Flat> flats_between(double z) const {
-        std::vector<Flat> flats;
-        for (const Feature& f : ground_.plan.features) {
-            if (f.type != FeatureType::up_flat || f.area < fitted_.cutting.min_flat_area ||
-                f.z_low >= layer_.z_top || f.z_low <= z)
-                continue;
-            Flat& flat = flats.emplace_back(Flat{f.z_low, f.z_low});
-            for (const std::uint32_t facet : f.facets)
-                for (const std::uint32_t v : ground_.pattern.facets[facet])
-                    flat.highest = std::max(flat.highest, static_cast<double>(ground_.pattern.vertices[v].z));
+    // Every set whole, unless it falls behind: the fixed one first, so that the others are measured by it.
+    void plan_all(LayerTools selected) {
+        const double rest = 1 - kSelectionShare;
+        const bool may_widen = !selection_->vertical;
+        const double finish_at = may_widen ? kSelectionShare + kFirstSetsShare * rest : 1,
+                     rough_at = may_widen ? finish_at + kWiderFinishShare * rest : 1;
+        add("fixed", fixed_tools(trials_.job()));
+        add("selected", std::move(selected));
+        try_sets(0, kSelectionShare, finish_at);
+        if (!may_widen) return;
+        // Of the sets planned so far the best, with a wider finish tool, then with a wider roughing cutter.
+        std::size_t first = sets_.size();
+        if (std::optional<LayerTools> tools = with_wider_finish(trials_.job(), sets_[chosen_].tools))
+            add("wider", std::move(*tools));
+        try_sets(first, finish_at, rough_at);
+        first = sets_.size();
+        add_wider_rough(sets_[chosen_].tools);
+        try_sets(first, rough_at, 1);
+    }
+
+    void add_wider_rough(const LayerTools& base) {
+        for (LayerTools& tools : with_wider_rough(context_, trials_.layer(), base))
+            add("wider rough", std::move(tools));
+    }
+
+    // The ball that is foreseen to finish first, with the roughing cutters that clear the waste first. By
+    // what that took other balls are foreseen again, and only one that should take clearly less is tried,
+    // too.
+    void follow_the_foreseen(const LayerTools& selected) {
+        const Job& job = trials_.job();
+        const ForeseenFinish finish(context_, trials_.layer(), selected.finish);
+        for (ToolCandidate& candidate : selection_->candidates)
+            if (candidate.purpose == "finish") candidate.minutes = finish.minutes(candidate.tool);
+        const LayerTools fixed = fixed_tools(job);
+        const LayerTools base = with_finish(fixed, finish.best());
+        add(same(base, fixed) ? "fixed" : "foreseen", base);
+        if (same(selected.finish, base.finish)) add("selected", selected);
+        if (!selection_->vertical) add_wider_rough(base);
+        const double rest = 1 - kSelectionShare, cleared_at = kSelectionShare + kClearingShare * rest,
+                     finished_at = cleared_at + kFinishingShare * rest;
+        finish_the_first(kSelectionShare, cleared_at, finished_at);
+        if (std::optional<Tool> other = finish.better_than(sets_[chosen_].tools.finish, best_->pace)) {
+            const std::size_t first = sets_.size();
+            add(other->diameter > sets_[chosen_].tools.finish.diameter ? "wider" : "narrower",
+                with_finish(sets_[chosen_].tools, *other));
+            constexpr double kBehind = 1.05;  // what was foreseen to be faster is given up sooner
+            try_sets(first, finished_at, 1, kBehind);
         }
-        return flats;
+    }
+    [[nodiscard]] LayerTools with_finish(LayerTools tools, const Tool& ball) const {
+        tools.finish = ball;
+        tools.rest = rest_tools(trials_.job(), tools.rough, ball.diameter);
+        return tools;
     }
 
-    void choose() {
-        ToolChoice choice = select_tools(context_, work_, reach_ratio(context_, work_, ground_.scene));
-        add("selected", std::move(choice.tools));
-        selection_ = std::move(choice.record);
+    // All sets clear the waste; what then follows is alike, and only the first to be there goes on. A
+    // narrower roughing cutter leaves less to corners: where these take longer than it was behind it is
+    // planned, too.
+    void finish_the_first(double from, double cleared_at, double finished_at) {
+        std::optional<LayerPaths> leading;
+        std::size_t leader = 0;
+        std::vector<double> cleared(sets_.size(), 0);  // minutes; 0: it fell behind
+        const double step = (cleared_at - from) / static_cast<double>(sets_.size());
+        for (std::size_t s = 0; s < sets_.size(); ++s) {
+            const double at = from + step * static_cast<double>(s);
+            ProgressPart part(progress_, at, at + step);
+            std::optional<PaceAhead> ahead;
+            if (leading) {
+                const double minutes = cleared[leader];
+                ahead = PaceAhead{{minutes, minutes, minutes, minutes}, {1, 1, 1, 1}, 1};
+            }
+            LayerPaths paths = trials_.begin(sets_[s].tools);
+            const bool first = paths.clear(&part, ahead);
+            const LayerResult& so_far = paths.so_far();
+            sets_[s].record.minutes = so_far.pace[0];
+            sets_[s].record.tools = tools_in_order(so_far.operations);
+            part.reach(1);
+            if (!first) continue;
+            cleared[s] = so_far.pace[0] + kWasteMinutes * paths.waste_mm3();
+            if (leading && cleared[s] >= cleared[leader]) continue;
+            leading.emplace(std::move(paths));
+            leader = s;
+        }
+        ProgressPart part(progress_, cleared_at, finished_at);
+        judge(leader, trials_.plan(sets_[leader].tools, {}, part, &*leading));
+        leading.reset();
+        double corners = 0;
+        for (const Operation& op : best_->planned.layer.operations)
+            if (op.kind == OperationKind::corner)
+                corners += motion_time(op.moves, ground_.plan.job.machine, op.blend).minutes;
+        for (std::size_t s = 0; s < sets_.size(); ++s) {
+            NamedSet& set = sets_[s];
+            if (s == leader) continue;
+            if (cleared[s] > 0 && set.tools.rough.diameter < sets_[leader].tools.rough.diameter &&
+                cleared[s] - cleared[leader] < corners) {
+                ProgressPart none(progress_, finished_at, finished_at);
+                try_set(s, none, PaceAhead{}.times);
+            } else {
+                set.record.reason =
+                    fmt::format("given up: clearing takes it {:.1f} min or more, set {} {:.1f} min",
+                                set.record.minutes, leader + 1, cleared[leader]);
+            }
+        }
     }
 
-    // Plans the sets from `first` on; their share of the progress is [from, to].
-    void try_sets(std::size_t first, double from, double to) {
+    // Where what is best bears more than it may, all that was given up is planned whole, and then stiffer
+    // tools.
+    void hold() {
+        if (!best_->strained) return;
+        add("fixed", fixed_tools(trials_.job()));
+        try_sets(0, 1, 1);
+        if (!best_->strained) return;
+        if (std::optional<LayerTools> stiffer = stiffer_tools(trials_.job(), sets_[chosen_].tools)) {
+            const std::size_t first = sets_.size();
+            add("stiffer", std::move(*stiffer));
+            try_sets(first, 1, 1);
+        }
+    }
+
+    // Plans the sets from `first` on that were not tried; their share of the progress is [from, to].
+    // They are given up where they take `behind` times as long as the best, or longer.
+    void try_sets(std::size_t first, double from, double to, double behind = PaceAhead{}.times) {
         const double step = (to - from) / static_cast<double>(std::max<std::size_t>(1, sets_.size() - first));
         for (std::size_t s = first; s < sets_.size(); ++s) {
+            if (sets_[s].tried) continue;
             const double at = from + step * static_cast<double>(s - first);
             ProgressPart part(progress_, at, at + step);
-            judge(s, plan_with(sets_[s].tools, part));
+            try_set(s, part, behind);
             part.reach(1);
         }
     }
 
-    // A floor's cutter takes what roughing has left on the walls beside it at once, up to their tops: for all
-    // walls that bear it the quickest. Where thin ones do not, and its feed falls or it goes in several
-    // passes, the walls are tried first: level by level, around them and so from both sides, and nothing of
-    // them is left to the floors.
-    Trial plan_with(const LayerTools& tools, ProgressPart& part) {
-        Trial trial = plan_once(tools, part);
-        if (!walls_ || !trial.floors_slowed) return trial;
-        work_.walls_first = true;
-        Trial other = plan_once(tools, part);
-        work_.walls_first = false;
-        if (!other.whole || other.leaves_more ||
-            (other.left_mm2 && trial.left_mm2 && *other.left_mm2 > kMore * *trial.left_mm2 + kFew))
-            return trial;
-        return std::pair(other.strained, other.minutes) < std::pair(trial.strained, trial.minutes) ? other
-                                                                                                   : trial;
-    }
-
     // Where the best set so far is too far ahead, and holds, the paths are not followed any further.
-    Trial plan_once(const LayerTools& tools, ProgressPart& part) {
-        const Job& job = ground_.plan.job;
-        work_.tools = tools;
-        work_.progress = &part;
-        const double below = tools.finish.diameter / 2;
-        const double board =
-            job.machine.base_board_cut >= 0 ? overrun_.board : std::min(below, overrun_.board);
-        work_.floor_below = layer_.z_bottom - (ground_.carried_by ? below : board);
-        work_.feet = flats_between(work_.floor_below);
-        const bool compared = selection_ || sets_.size() > 1;  // else nobody asks for its time
-        work_.paced = compared;
-        work_.ahead.reset();
-        if (best_ && !best_->strained) work_.ahead = ahead_of(tools, sets_[chosen_].tools, best_->pace);
-        work_.last_steps =
-            overhang_ ? last_rough_steps(job, tools.rough, overhang_->largest() + job.bonding.edge_setback,
-                                         layer_.z_top - layer_.z_bottom)
-                      : 0;
-        LayerResult result = plan_layer_paths(context_, work_);
-        Trial trial;
-        Layer& layer = trial.planned.layer = layer_;
-        layer.operations = std::move(result.operations);
-        for (Operation& op : layer.operations) limit_feeds(op, job);
-        trial.planned.diagnostics = std::move(result.diagnostics);
-        if (!best_) allowed_left_ = kMore * result.left_mm2 + kFew;
-        if (!result.given_up) trial.left_mm2 = result.left_mm2;
-        trial.leaves_more = best_ && !result.given_up && result.left_mm2 > allowed_left_;
-        if (job.cutting.engagement == Engagement::nominal && job.cutting.adapt_feed)
-            for (Operation& op : layer.operations)
-                slow_down(op,
-                          *std::find_if(job.tools.begin(), job.tools.end(),
-                                        [&](const Tool& t) { return t.number == op.tool; }),
-                          job);
-        if (compared) trial.minutes = minutes_of(layer, job.machine);
-        trial.pace = result.pace;
-        trial.whole = !result.given_up;
-        if (!trial.whole || trial.leaves_more || job.cutting.engagement != Engagement::simulated)
-            return trial;
-        const double floors = walls_ ? floor_minutes(layer, job.machine) : 0;
-        trial.planned.cuts = adapt_layer(context_, layer, ground_.plan,
-                                         {overhang_ ? &*overhang_ : nullptr, walls_ ? &*walls_ : nullptr},
-                                         trial.planned.diagnostics, ground_.known_cuts);
-        constexpr double kSlowed = 1.1;
-        trial.floors_slowed = walls_ && floor_minutes(layer, job.machine) > kSlowed * floors;
-        if (compared || walls_) trial.minutes = minutes_of(layer, job.machine);
-        trial.strained = trial.planned.cuts.strain > kStrained;
-        return trial;
+    void try_set(std::size_t s, ProgressPart& part, double behind) {
+        TrialLimits limits;
+        if (best_) limits.left_mm2 = allowed_left_;
+        if (best_ && !best_->strained) {
+            limits.ahead = ahead_of(sets_[s].tools, sets_[chosen_].tools, best_->pace);
+            limits.ahead->times = std::min(limits.ahead->times, behind);
+        }
+        judge(s, trials_.plan(sets_[s].tools, limits, part));
     }
 
     // Keeps the trial of set s where it is the best so far.
     void judge(std::size_t s, Trial trial) {
-        if (selection_) {
-            ToolSet& set = selection_->sets.emplace_back(ToolSet{sets_[s].name,
-                                                                 tools_in_order(trial.planned.layer),
-                                                                 trial.minutes,
-                                                                 trial.left_mm2,
-                                                                 false,
-                                                                 {}});
-            if (!trial.left_mm2)
-                set.reason =
-                    fmt::format("given up: {:.1f} min of it are too far behind the set of {:.1f} min",
-                                trial.minutes, best_->minutes);
-            else if (trial.leaves_more)
-                set.reason = fmt::format("leaves {:.1f} mm² over the limit, the first set {:.1f} mm²",
-                                         *trial.left_mm2, selection_->sets[0].left_mm2.value_or(0));
-            else if (trial.strained)
-                set.reason =
-                    fmt::format("cutter, spindle or a thin wall would bear {:.2f} times what they may",
-                                trial.planned.cuts.strain);
-        }
-        strained_.push_back(trial.strained);
+        NamedSet& tried = sets_[s];
+        ToolSet& set = tried.record;
+        tried.tried = true;
+        tried.strained = trial.strained;
+        set.tools = tools_in_order(trial.planned.layer.operations);
+        set.minutes = trial.minutes;
+        set.left_mm2 = trial.left_mm2;
+        if (!best_) allowed_left_ = kMoreLeft * trial.left_mm2.value_or(0) + kFewLeft, first_ = s;
+        if (!trial.left_mm2)
+            set.reason = fmt::format("given up: {:.1f} min of it are too far behind the set of {:.1f} min",
+                                     trial.minutes, best_->minutes);
+        else if (trial.leaves_more)
+            set.reason = fmt::format("leaves {:.1f} mm² over the limit, the first set {:.1f} mm²",
+                                     *trial.left_mm2, sets_[first_].record.left_mm2.value_or(0));
+        else if (trial.strained)
+            set.reason = fmt::format("cutter, spindle or a thin wall would bear {:.2f} times what they may",
+                                     trial.planned.cuts.strain);
         // What holds is better than what is fast.
         if (!best_ || (trial.whole && !trial.leaves_more &&
                        std::pair(trial.strained, trial.minutes) < std::pair(best_->strained, best_->minutes)))
@@ -298,35 +271,32 @@ private:
     }
 
     void give_reasons() {
-        ToolSet& chosen = selection_->sets[chosen_];
-        chosen.chosen = true;
+        const double least = sets_[chosen_].record.minutes;
         bool faster = false;  // one that does not hold
-        for (std::size_t s = 0; s < strained_.size(); ++s)
-            faster |= strained_[s] && s != chosen_ && selection_->sets[s].minutes < chosen.minutes;
-        chosen.reason = sets_.size() == 1 ? "not compared"
-                        : faster ? "takes the least time of those that leave no more and bear what they must"
-                                 : "takes the least time of those that leave no more";
-        for (ToolSet& set : selection_->sets)
-            if (set.reason.empty())
-                set.reason = fmt::format("takes {:.1f} min longer", set.minutes - chosen.minutes);
+        for (const NamedSet& set : sets_) faster |= set.strained && set.record.minutes < least;
+        for (NamedSet& set : sets_) {
+            ToolSet& record = selection_->sets.emplace_back(std::move(set.record));
+            record.name = std::move(set.name);
+            record.chosen = &set == &sets_[chosen_];
+            if (record.chosen)
+                record.reason =
+                    sets_.size() == 1 ? "not compared"
+                    : faster ? "takes the least time of those that leave no more and bear what they must"
+                             : "takes the least time of those that leave no more";
+            else if (record.reason.empty())
+                record.reason = fmt::format("takes {:.1f} min longer", record.minutes - least);
+        }
     }
 
     Context& context_;
     const LayerGround& ground_;
-    const Layer& layer_;
-    Job fitted_;  // a layer may be taller than the shortest tools make; the others make it then
-    const Overrun overrun_;
+    LayerTrials trials_;
     ProgressPart& progress_;
-    Mesh near_;  // what of the ground the layer's cutters may meet
-    LayerJob work_;
-    std::optional<OverhangMap> overhang_;
-    std::optional<WallMap> walls_;
     std::vector<NamedSet> sets_;
     std::optional<LayerSelection> selection_;
-    std::vector<bool> strained_;  // of the sets that were tried
     std::optional<Trial> best_;
-    std::size_t chosen_ = 0;
-    double allowed_left_ = 0;  // mm²
+    std::size_t chosen_ = 0, first_ = 0;  // of the sets: the best; the first that was planned whole
+    double allowed_left_ = 0;             // mm²
 };
 
 }  // namespace

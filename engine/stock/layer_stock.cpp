@@ -477,6 +477,22 @@ double LayerStock::area_over(Context& context, double limit) const {
     return static_cast<double>(cells) * grid_.cell * grid_.cell;
 }
 
+double LayerStock::volume_over(Context& context, double limit) const {
+    const double mm = parallel_reduce(
+        context, static_cast<std::size_t>(grid_.ny), std::size_t{16}, 0.0,
+        [&](std::size_t begin, std::size_t end) {
+            double over = 0;
+            for (std::size_t j = begin; j < end; ++j)
+                each_left(static_cast<int>(j), limit, [&](int i) {
+                    const std::size_t c = grid_.index(i, static_cast<int>(j));
+                    over += height(c) - surface(c);
+                });
+            return over;
+        },
+        std::plus<>());
+    return mm * grid_.cell * grid_.cell;
+}
+
 void LayerStock::cut_at(const CutterEnd& end, double x, double y, double tip_z) {
     cut_along(end, {x, y, tip_z}, {x, y, tip_z});
 }

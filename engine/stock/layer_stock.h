@@ -173,6 +173,8 @@ public:
 
     /// mm² on which more than `limit` (mm along the normal) is left over.
     [[nodiscard]] double area_over(Context& context, double limit) const;
+    /// mm³ that stand there over the surface.
+    [[nodiscard]] double volume_over(Context& context, double limit) const;
 
     /// Bytes of the stock of a layer of `plane_mm2` with the finest ball of the job, and of what a trial may
     /// keep of its heights.

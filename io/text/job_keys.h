@@ -503,7 +503,9 @@ void visit_plain_job_keys(JobLike& job, Visit& visit) {
                "the smaller");
     visit.key("semi_rough", job.selection.semi_rough, "a semi-roughing tool where it saves time");
     visit.key("compare", job.selection.compare,
-              "plan every layer with the fixed set too, and keep what is faster");
+              "lay the paths of several sets of tools in every layer, and keep what is fastest");
+    visit.key("foresee", job.selection.foresee,
+              "of these only sets that are foreseen to be fast; false: all, which takes two to three times as long");
     visit.key("voxel", job.selection.voxel, "mm, on which the semi-roughing area AS is measured");
 
     visit_flask_keys(job.flask, visit);

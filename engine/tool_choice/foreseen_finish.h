@@ -1,0 +1,52 @@
+// What each ball end mill would have to do where a layer slopes, before any path is laid.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "engine/layer_job.h"
+#include "kernels/cutting/layer_solid.h"
+#include "kernels/parallel/context.h"
+
+namespace slabwright {
+
+/// Of the surface of a layer that is neither level nor upright.
+struct FinishWork {
+    double contours_mm = 0;  ///< of level contours, on slopes from cutting.steep_limit_deg up
+    double lines_mm = 0;     ///< of projected lines, on the others
+    double left_mm2 = 0;     ///< where the ball, which would touch it, meets something else first
+};
+
+/// Measured at points that lie evenly on the surface, a few thousand at most; the same on any number of
+/// threads.
+/// @param layer all but its tools
+/// @param solid of the layer's mesh, from its floor_below up
+/// @throws Error(usage) as DropIndex
+[[nodiscard]] FinishWork finish_work(Context& context, const LayerJob& layer, const LayerSolid& solid,
+                                     const Tool& ball);
+
+/// Which of a job's ball end mills finishes a layer first, with what it leaves to narrower ones.
+class ForeseenFinish {
+public:
+    /// @param layer all but its tools
+    /// @param preferred a ball of the job's tools, where several take as long
+    ForeseenFinish(Context& context, const LayerJob& layer, const Tool& preferred);
+
+    [[nodiscard]] const Tool& best() const { return balls_[best_].tool; }
+    /// None for a tool that is no ball of the job's.
+    [[nodiscard]] std::optional<double> minutes(int tool) const;
+    /// The ball that should take less than one with which the layer was planned, its pace given.
+    /// @param done one of the job's balls
+    [[nodiscard]] std::optional<Tool> better_than(const Tool& done, const LayerPace& pace) const;
+
+private:
+    struct Ball {
+        Tool tool;
+        FinishWork work;
+        double minutes = 0;
+    };
+    std::vector<Ball> balls_;
+    std::size_t best_ = 0;
+};
+
+}  // namespace slabwright
