@@ -103,7 +103,7 @@ struct ToolCandidate {
     /// By LUO's formulas, of all operations that this choice changes; of a finish tool what finishing is
     /// foreseen to take, where sets were compared by that.
     std::optional<double> minutes;
-    std::string reason;                    ///< why it was chosen or not, in words
+    std::string reason;  ///< why it was chosen or not, in words
 };
 
 /// A set of tools that a layer was planned with.

@@ -505,7 +505,8 @@ void visit_plain_job_keys(JobLike& job, Visit& visit) {
     visit.key("compare", job.selection.compare,
               "lay the paths of several sets of tools in every layer, and keep what is fastest");
     visit.key("foresee", job.selection.foresee,
-              "of these only sets that are foreseen to be fast; false: all, which takes two to three times as long");
+              "of these only sets that are foreseen to be fast; false: all, which takes two to three times "
+              "as long");
     visit.key("voxel", job.selection.voxel, "mm, on which the semi-roughing area AS is measured");
 
     visit_flask_keys(job.flask, visit);
