@@ -128,6 +128,11 @@ TEST(ForeseenFinish, TheWidestBallThatLeavesLittleIsBest) {
     const std::optional<Tool> better = wide.better_than(gentle.ball(0.125 * kInch), pace);
     ASSERT_TRUE(better);
     EXPECT_DOUBLE_EQ(better->diameter, 0.5 * kInch);
+    const int widest = better->number;
+    EXPECT_FALSE(wide.better_than(gentle.ball(0.125 * kInch), pace, 0.1)) << "not by so much";
+    const std::optional<Tool> next = wide.better_than(gentle.ball(0.125 * kInch), pace, 1, {&widest, 1});
+    ASSERT_TRUE(next);
+    EXPECT_EQ(next->number, quarter.number);
     // Where nearly all the time goes into what is left the widest is not it.
     EXPECT_FALSE(narrow.better_than(grooved.ball(0.125 * kInch), pace));
     Tool other = quarter;

@@ -143,12 +143,20 @@ private:
         const double rest = 1 - kSelectionShare, cleared_at = kSelectionShare + kClearingShare * rest,
                      finished_at = cleared_at + kFinishingShare * rest;
         finish_the_first(kSelectionShare, cleared_at, finished_at);
-        if (std::optional<Tool> other = finish.better_than(sets_[chosen_].tools.finish, best_->pace)) {
+        // After one that was not faster, another only where it should be clearly so.
+        std::vector<int> tried{finish.best().number};
+        double at = finished_at;
+        for (const double share : {1.0, 0.96}) {
+            const LayerTools& best = sets_[chosen_].tools;
+            const std::optional<Tool> other = finish.better_than(best.finish, best_->pace, share, tried);
+            if (!other) break;
+            tried.push_back(other->number);
             const std::size_t first = sets_.size();
-            add(other->diameter > sets_[chosen_].tools.finish.diameter ? "wider" : "narrower",
-                with_finish(sets_[chosen_].tools, *other));
+            add(other->diameter > best.finish.diameter ? "wider" : "narrower", with_finish(best, *other));
             constexpr double kBehind = 1.05;  // what was foreseen to be faster is given up sooner
-            try_sets(first, finished_at, 1, kBehind);
+            const double to = (at + 1) / 2;
+            try_sets(first, at, to, kBehind);
+            at = to;
         }
     }
     [[nodiscard]] LayerTools with_finish(LayerTools tools, const Tool& ball) const {

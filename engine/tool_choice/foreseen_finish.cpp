@@ -122,7 +122,8 @@ std::optional<double> ForeseenFinish::minutes(int tool) const {
     return std::nullopt;
 }
 
-std::optional<Tool> ForeseenFinish::better_than(const Tool& done, const LayerPace& pace) const {
+std::optional<Tool> ForeseenFinish::better_than(const Tool& done, const LayerPace& pace, double share,
+                                                std::span<const int> tried) const {
     const auto of = std::find_if(balls_.begin(), balls_.end(),
                                  [&](const Ball& ball) { return ball.tool.number == done.number; });
     if (of == balls_.end()) return std::nullopt;
@@ -132,9 +133,9 @@ std::optional<Tool> ForeseenFinish::better_than(const Tool& done, const LayerPac
     };
     const double after = pace[3] - pace[2];
     const Ball* better = nullptr;
-    double least = pace[3];
+    double least = share * pace[3];
     for (const Ball& ball : balls_) {
-        if (&ball == &*of) continue;
+        if (&ball == &*of || std::find(tried.begin(), tried.end(), ball.tool.number) != tried.end()) continue;
         const FinishWork& work = ball.work;
         const double minutes = pace[0] + scaled(pace[1] - pace[0], was.contours_mm, work.contours_mm) +
                                scaled(pace[2] - pace[1], was.lines_mm, work.lines_mm) +

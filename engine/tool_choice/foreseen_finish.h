@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "engine/layer_job.h"
@@ -37,7 +38,10 @@ public:
     [[nodiscard]] std::optional<double> minutes(int tool) const;
     /// The ball that should take less than one with which the layer was planned, its pace given.
     /// @param done one of the job's balls
-    [[nodiscard]] std::optional<Tool> better_than(const Tool& done, const LayerPace& pace) const;
+    /// @param share of the time of that one, which it should stay under
+    /// @param tried numbers of balls that are not asked for any more
+    [[nodiscard]] std::optional<Tool> better_than(const Tool& done, const LayerPace& pace, double share = 1,
+                                                  std::span<const int> tried = {}) const;
 
 private:
     struct Ball {
