@@ -110,17 +110,17 @@ TEST(ForeseenFinish, TheWidestBallThatLeavesLittleIsBest) {
     OneLayer grooved([](double x, double) { return 12 + 3 * std::cos(x / 0.9); }, 0.25);
     const Tool quarter = gentle.ball(0.25 * kInch);
     const ForeseenFinish wide(gentle.context, gentle.layer, quarter);
-    EXPECT_DOUBLE_EQ(wide.best().diameter, 0.5 * kInch);
+    EXPECT_DOUBLE_EQ(wide.ranked().front().diameter, 0.5 * kInch);
     const ForeseenFinish narrow(grooved.context, grooved.layer, quarter);
-    EXPECT_DOUBLE_EQ(narrow.best().diameter, 0.125 * kInch);
+    EXPECT_DOUBLE_EQ(narrow.ranked().front().diameter, 0.125 * kInch);
     for (const Tool& tool : gentle.job.tools) {
         ASSERT_EQ(wide.minutes(tool.number).has_value(), tool.kind == ToolKind::ball);
         if (tool.kind == ToolKind::ball)
-            EXPECT_LE(*wide.minutes(wide.best().number), *wide.minutes(tool.number));
+            EXPECT_LE(*wide.minutes(wide.ranked().front().number), *wide.minutes(tool.number));
     }
     // Nothing to finish: whichever was preferred.
     OneLayer level([](double, double) { return 12.0; });
-    EXPECT_EQ(ForeseenFinish(level.context, level.layer, quarter).best().number, quarter.number);
+    EXPECT_EQ(ForeseenFinish(level.context, level.layer, quarter).ranked().front().number, quarter.number);
 
     // Once planned: with the widest ball none should be faster; with the narrowest a wider one.
     const LayerPace pace{5, 6, 9, 9.2};

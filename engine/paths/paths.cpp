@@ -219,7 +219,8 @@ public:
             drop_idle();
         }
         reached(0.24);
-        return !hopeless(waste_cleared, layer_.ahead ? waste_mm3() : 0) &&
+        constexpr double kAtLeast = 0.45;  // of kWasteMinutes: what is easiest to clear took
+        return !hopeless(waste_cleared, layer_.ahead ? kAtLeast * waste_mm3() : 0) &&
                (!stock_ || clear_waste(*stock_)) && !hopeless(waste_cleared);
     }
 

@@ -26,7 +26,7 @@ struct LayerResult {
 
 /// Minutes per mm³ of waste over a millimetre thick, to whatever clears it or meets it later: fitted to 102
 /// layers of castings, each with one ball and several roughing cutters, so that what these took to clear and
-/// what they left tells which of them is done first. Hardly any takes less.
+/// what they left tells which of them is done first.
 inline constexpr double kWasteMinutes = 1.2e-4;
 
 /// The same in two parts: sets of tools that only differ in what clears the waste are compared after the

@@ -23,8 +23,8 @@ constexpr double kSelectionShare = 0.3;
 // of what then remains, where all sets are planned: the sets of the choice, then one with a wider finish
 // tool;
 constexpr double kFirstSetsShare = 0.5, kWiderFinishShare = 0.25;
-// and where the best is foreseen: clearing by each set, then finishing by one.
-constexpr double kClearingShare = 0.5, kFinishingShare = 0.4;
+// and where the best is foreseen: a ball with all roughing cutters, and of that clearing by each.
+constexpr double kRaceShare = 0.9, kClearingShare = 0.55;
 
 bool same(const Tool& a, const Tool& b) {
     return a.number == b.number && a.stepdown_min == b.stepdown_min && a.stepdown_max == b.stepdown_max;
@@ -127,25 +127,25 @@ private:
             add("wider rough", std::move(tools));
     }
 
-    // The ball that is foreseen to finish first, with the roughing cutters that clear the waste first. By
-    // what that took other balls are foreseen again, and only one that should take clearly less is tried,
-    // too.
+    // The ball that is foreseen to finish first, with the roughing cutters that clear the waste first; where
+    // that bears more than it may, the next ball. By what it took other balls are foreseen again, and only
+    // one that should take less is tried, too.
     void follow_the_foreseen(const LayerTools& selected) {
-        const Job& job = trials_.job();
         const ForeseenFinish finish(context_, trials_.layer(), selected.finish);
         for (ToolCandidate& candidate : selection_->candidates)
             if (candidate.purpose == "finish") candidate.minutes = finish.minutes(candidate.tool);
-        const LayerTools fixed = fixed_tools(job);
-        const LayerTools base = with_finish(fixed, finish.best());
-        add(same(base, fixed) ? "fixed" : "foreseen", base);
-        if (same(selected.finish, base.finish)) add("selected", selected);
-        if (!selection_->vertical) add_wider_rough(base);
-        const double rest = 1 - kSelectionShare, cleared_at = kSelectionShare + kClearingShare * rest,
-                     finished_at = cleared_at + kFinishingShare * rest;
-        finish_the_first(kSelectionShare, cleared_at, finished_at);
+        constexpr std::size_t kRaces = 3;
+        double at = kSelectionShare;
+        std::vector<int> tried;
+        for (const Tool& ball : finish.ranked()) {
+            const double to = at + kRaceShare * (1 - at);
+            race(ball, selected, at, to);
+            at = to;
+            tried.push_back(ball.number);
+            if (!best_->strained || tried.size() == kRaces) break;
+        }
+        if (best_->strained) return;
         // After one that was not faster, another only where it should be clearly so.
-        std::vector<int> tried{finish.best().number};
-        double at = finished_at;
         for (const double share : {1.0, 0.96}) {
             const LayerTools& best = sets_[chosen_].tools;
             const std::optional<Tool> other = finish.better_than(best.finish, best_->pace, share, tried);
@@ -159,22 +159,31 @@ private:
             at = to;
         }
     }
+    void race(const Tool& ball, const LayerTools& selected, double from, double to) {
+        const LayerTools fixed = fixed_tools(trials_.job()), base = with_finish(fixed, ball);
+        const std::size_t first = sets_.size();
+        add(same(base, fixed) ? "fixed" : "foreseen", base);
+        if (same(selected.finish, base.finish)) add("selected", selected);
+        if (!selection_->vertical) add_wider_rough(base);
+        finish_the_first(first, from, from + kClearingShare * (to - from), to);
+    }
     [[nodiscard]] LayerTools with_finish(LayerTools tools, const Tool& ball) const {
         tools.finish = ball;
         tools.rest = rest_tools(trials_.job(), tools.rough, ball.diameter);
         return tools;
     }
 
-    // All sets clear the waste; what then follows is alike, and only the first to be there goes on. A
-    // narrower roughing cutter leaves less to corners: where these take longer than it was behind it is
-    // planned, too.
-    void finish_the_first(double from, double cleared_at, double finished_at) {
+    // All sets from `begin` on clear the waste; what then follows is alike, and only the first to be there
+    // goes on. A narrower roughing cutter leaves less to corners: where these take longer than it was behind
+    // it is planned, too.
+    void finish_the_first(std::size_t begin, double from, double cleared_at, double to) {
+        if (begin == sets_.size()) return;
         std::optional<LayerPaths> leading;
-        std::size_t leader = 0;
+        std::size_t leader = begin;
         std::vector<double> cleared(sets_.size(), 0);  // minutes; 0: it fell behind
-        const double step = (cleared_at - from) / static_cast<double>(sets_.size());
-        for (std::size_t s = 0; s < sets_.size(); ++s) {
-            const double at = from + step * static_cast<double>(s);
+        const double step = (cleared_at - from) / static_cast<double>(sets_.size() - begin);
+        for (std::size_t s = begin; s < sets_.size(); ++s) {
+            const double at = from + step * static_cast<double>(s - begin);
             ProgressPart part(progress_, at, at + step);
             std::optional<PaceAhead> ahead;
             if (leading) {
@@ -182,30 +191,29 @@ private:
                 ahead = PaceAhead{{minutes, minutes, minutes, minutes}, {1, 1, 1, 1}, 1};
             }
             LayerPaths paths = trials_.begin(sets_[s].tools);
-            const bool first = paths.clear(&part, ahead);
+            const bool keeps_up = paths.clear(&part, ahead);
             const LayerResult& so_far = paths.so_far();
             sets_[s].record.minutes = so_far.pace[0];
             sets_[s].record.tools = tools_in_order(so_far.operations);
             part.reach(1);
-            if (!first) continue;
+            if (!keeps_up) continue;
             cleared[s] = so_far.pace[0] + kWasteMinutes * paths.waste_mm3();
             if (leading && cleared[s] >= cleared[leader]) continue;
             leading.emplace(std::move(paths));
             leader = s;
         }
-        ProgressPart part(progress_, cleared_at, finished_at);
-        judge(leader, trials_.plan(sets_[leader].tools, {}, part, &*leading));
+        ProgressPart part(progress_, cleared_at, to);
+        TrialLimits limits;
+        if (best_) limits.left_mm2 = allowed_left_;
+        judge(leader, trials_.plan(sets_[leader].tools, limits, part, &*leading));
         leading.reset();
-        double corners = 0;
-        for (const Operation& op : best_->planned.layer.operations)
-            if (op.kind == OperationKind::corner)
-                corners += motion_time(op.moves, ground_.plan.job.machine, op.blend).minutes;
-        for (std::size_t s = 0; s < sets_.size(); ++s) {
+        const double corners = chosen_ == leader && !best_->strained ? corner_minutes() : 0;
+        for (std::size_t s = begin; s < sets_.size(); ++s) {
             NamedSet& set = sets_[s];
             if (s == leader) continue;
             if (cleared[s] > 0 && set.tools.rough.diameter < sets_[leader].tools.rough.diameter &&
                 cleared[s] - cleared[leader] < corners) {
-                ProgressPart none(progress_, finished_at, finished_at);
+                ProgressPart none(progress_, to, to);
                 try_set(s, none, PaceAhead{}.times);
             } else {
                 set.record.reason =
@@ -213,6 +221,14 @@ private:
                                 set.record.minutes, leader + 1, cleared[leader]);
             }
         }
+    }
+    // Of the best set.
+    [[nodiscard]] double corner_minutes() const {
+        double minutes = 0;
+        for (const Operation& op : best_->planned.layer.operations)
+            if (op.kind == OperationKind::corner)
+                minutes += motion_time(op.moves, ground_.plan.job.machine, op.blend).minutes;
+        return minutes;
     }
 
     // Where what is best bears more than it may, all that was given up is planned whole, and then stiffer

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "engine/tools/tools.h"
@@ -110,10 +111,18 @@ ForeseenFinish::ForeseenFinish(Context& context, const LayerJob& layer, const To
         if (tool.diameter < usual) ball.minutes *= kNarrower;
         balls_.push_back(std::move(ball));
     }
-    for (std::size_t b = 0; b < balls_.size(); ++b) {
-        const double ahead = balls_[best_].minutes - balls_[b].minutes;
-        if (ahead > 0 || (ahead == 0 && balls_[b].tool.number == preferred.number)) best_ = b;
-    }
+    std::stable_sort(balls_.begin(), balls_.end(), [&](const Ball& a, const Ball& b) {
+        const auto rank = [&](const Ball& ball) {
+            return std::pair(ball.minutes, ball.tool.number != preferred.number);
+        };
+        return rank(a) < rank(b);
+    });
+}
+
+std::vector<Tool> ForeseenFinish::ranked() const {
+    std::vector<Tool> tools;
+    for (const Ball& ball : balls_) tools.push_back(ball.tool);
+    return tools;
 }
 
 std::optional<double> ForeseenFinish::minutes(int tool) const {

@@ -33,7 +33,8 @@ public:
     /// @param preferred a ball of the job's tools, where several take as long
     ForeseenFinish(Context& context, const LayerJob& layer, const Tool& preferred);
 
-    [[nodiscard]] const Tool& best() const { return balls_[best_].tool; }
+    /// The job's balls, the one that is foreseen to be the fastest first.
+    [[nodiscard]] std::vector<Tool> ranked() const;
     /// None for a tool that is no ball of the job's.
     [[nodiscard]] std::optional<double> minutes(int tool) const;
     /// The ball that should take less than one with which the layer was planned, its pace given.
@@ -49,8 +50,7 @@ private:
         FinishWork work;
         double minutes = 0;
     };
-    std::vector<Ball> balls_;
-    std::size_t best_ = 0;
+    std::vector<Ball> balls_;  // ranked
 };
 
 }  // namespace slabwright
