@@ -140,6 +140,18 @@ TEST(ForeseenFinish, TheWidestBallThatLeavesLittleIsBest) {
     EXPECT_FALSE(wide.better_than(other, pace)) << "no ball of the job's";
 }
 
+TEST(ForeseenFinish, NotWithABallThatItsEdgesAloneBend) {
+    Job job;
+    for (const char* name : {"shop", "metric", "forms"}) {
+        job.tools = *named_library(name);
+        EXPECT_TRUE(finish_is_foreseeable(job)) << name;
+    }
+    job.tools = luo_library();
+    EXPECT_FALSE(finish_is_foreseeable(job)) << "1/8 in, of steel, 40 mm long";
+    std::erase_if(job.tools, [](const Tool& t) { return t.kind == ToolKind::ball && t.diameter < 4; });
+    EXPECT_TRUE(finish_is_foreseeable(job));
+}
+
 // Of random fields: what is foreseen takes hardly longer than the best of all sets, and fewer sets are
 // planned whole.
 TEST(ForeseenFinish, HardlySlowerThanTheBestOfAll) {

@@ -74,7 +74,7 @@ public:
             if (!how.compare) {
                 add("selected", std::move(choice.tools));
                 try_sets(0, kSelectionShare, 1);
-            } else if (how.foresee) {
+            } else if (how.foresee && finish_is_foreseeable(trials_.job())) {
                 follow_the_foreseen(choice.tools);
                 hold();
             } else {

@@ -98,6 +98,14 @@ FinishWork finish_work(Context& context, const LayerJob& layer, const LayerSolid
         [](const FinishWork& a, const FinishWork& b) { return a + b; });
 }
 
+bool finish_is_foreseeable(const Job& job) {
+    const double edges = std::hypot(job.material.kte, job.material.kfe);  // N for each mm of depth
+    return std::none_of(job.tools.begin(), job.tools.end(), [&](const Tool& tool) {
+        return tool.kind == ToolKind::ball &&
+               tip_bent_by(tool, edges * tool.stepdown_max) > job.tolerances.cusp;
+    });
+}
+
 ForeseenFinish::ForeseenFinish(Context& context, const LayerJob& layer, const Tool& preferred) {
     const Job& job = *layer.job;
     const LayerSolid solid = layer_solid(context, layer.mesh, layer.floor_below, layer.z_top);

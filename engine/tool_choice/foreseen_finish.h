@@ -26,6 +26,10 @@ struct FinishWork {
 [[nodiscard]] FinishWork finish_work(Context& context, const LayerJob& layer, const LayerSolid& solid,
                                      const Tool& ball);
 
+/// Whether no ball end mill of the job bends by more than the cusp by its edges alone, at its largest
+/// stepdown. One that does goes in many passes, slowly: what it takes is not foreseen.
+[[nodiscard]] bool finish_is_foreseeable(const Job& job);
+
 /// Which of a job's ball end mills finishes a layer first, with what it leaves to narrower ones.
 class ForeseenFinish {
 public:
