@@ -29,6 +29,7 @@ constexpr double kEdge = 0.05;        // mm: what only the cutter's very edge me
 constexpr double kWorthOfBall = 0.5;  // mm that a ball must lower a cell by: its rings leave ridges
 constexpr int kLevelsAStep = 2;       // of a ball
 constexpr int kTile = 16;             // cells
+constexpr double kBlock = 0.125;      // of the swath of a wall: by how much it may be off
 constexpr int kMostRings = 4000;
 constexpr std::size_t kMostPairs =
     4'000'000;  // of cells and edges whose distance is asked for at once: some milliseconds
@@ -98,32 +99,59 @@ public:
                left_over_.size() * (sizeof(left_over_[0]) + sizeof(cells_[0]));
     }
 
-    /// From here on cells are left alone on levels on which they lie within the swath of walls.
-    /// @param wall   a flat cutter as wide as the swath: it cannot stand there
+    /// From here on cells are left alone on levels on which they lie within the swath of walls, as seen from
+    /// the middle of the block that they are in.
+    /// @param wall   a flat cutter of the swath's radius: it cannot stand there
+    /// @param swath  mm
     /// @param lowest mm above the layer's bottom, of all levels
     /// @param floors mm; what stands on one of them is a target all the same, for no ball makes a floor
-    void leave_walls(Context& context, const DropIndex& wall, double lowest, std::span<const double> floors) {
+    void leave_walls(Context& context, const DropIndex& wall, double swath, double lowest,
+                     std::span<const double> floors) {
         const CellGrid& grid = stock_.grid();
         const auto on_floor = [&](std::size_t c) {
             const double z = stock_.z_bottom() + stock_.surface(c);
             return std::any_of(floors.begin(), floors.end(),
                                [&](double f) { return z <= f + 1e-3 && z >= f - kSameFloor - 1e-3; });
         };
-        constexpr std::size_t grain = 512;
-        parallel_for(context, left_over_.size(), grain, [&](std::size_t begin, std::size_t end) {
+        struct Block {
+            double x = 0, y = 0;  // mm, its middle
+            float highest = 0;    // mm above the layer's bottom, what stands in it
+            float wall = 0;
+        };
+        const int side = std::max(1, static_cast<int>(kBlock * swath / grid.cell));
+        std::vector<Block> blocks;
+        std::vector<std::uint32_t> block_of(left_over_.size());
+        // By column of blocks the latest; left_over_ goes row by row.
+        std::vector<std::array<std::int64_t, 2>> latest(static_cast<std::size_t>(grid.nx / side + 1),
+                                                        {-1, -1});
+        for (std::size_t k = 0; k < left_over_.size(); ++k) {
+            const auto [i, j, none] = left_over_[k];
+            const int column = i / side, row = j / side;
+            auto& [in_row, block] = latest[static_cast<std::size_t>(column)];
+            if (in_row != row) {
+                in_row = row, block = static_cast<std::int64_t>(blocks.size());
+                const double half = (side - 1) * grid.cell / 2;
+                blocks.push_back({grid.x(column * side) + half, grid.y(row * side) + half});
+            }
+            block_of[k] = static_cast<std::uint32_t>(block);
+            float& highest = blocks[block_of[k]].highest;
+            highest = std::max(highest, stock_.height(grid.index(i, j)));
+        }
+        constexpr std::size_t grain = 128;
+        parallel_for(context, blocks.size(), grain, [&](std::size_t begin, std::size_t end) {
             MetPoints met;
-            for (std::size_t k = begin; k < end; ++k) {
-                LeftOver& cell = left_over_[k];
-                const std::size_t c = grid.index(cell.i, cell.j);
-                if (on_floor(c)) continue;
+            for (std::size_t b = begin; b < end; ++b) {
                 // Beside a wall as high as what stands there no level has anything of it.
                 const std::optional<Rest> rest =
-                    wall.drop_within(grid.x(cell.i), grid.y(cell.j), stock_.z_bottom() + lowest,
-                                     stock_.z_bottom() + static_cast<double>(stock_.height(c)), &met);
-                cell.wall = rest ? static_cast<float>(rest->tip_z - stock_.z_bottom())
-                                 : std::numeric_limits<float>::infinity();
+                    wall.drop_within(blocks[b].x, blocks[b].y, stock_.z_bottom() + lowest,
+                                     stock_.z_bottom() + static_cast<double>(blocks[b].highest), &met);
+                blocks[b].wall = rest ? static_cast<float>(rest->tip_z - stock_.z_bottom())
+                                      : std::numeric_limits<float>::infinity();
             }
         });
+        for (std::size_t k = 0; k < left_over_.size(); ++k)
+            if (LeftOver& cell = left_over_[k]; !on_floor(grid.index(cell.i, cell.j)))
+                cell.wall = blocks[block_of[k]].wall;
     }
 
     /// Whether a level has any, as things are. @param tip, over as for mark()
@@ -330,7 +358,7 @@ public:
         for (const Level& l : levels) tips.push_back(l.tip);
         const auto tip_over = [&](double z) { return z - stock_.z_bottom(); };
         if (pass_.swath > 0)
-            targets.leave_walls(cut_.context, cut_.drops(flat_cutter(pass_.swath)),
+            targets.leave_walls(cut_.context, cut_.drops(flat_cutter(pass_.swath)), pass_.swath,
                                 tip_over(*std::min_element(tips.begin(), tips.end())), cut_.floors);
         // What no level has now none will have.
         std::vector<char> wanted(tips.size());
