@@ -13,6 +13,7 @@
 #include "engine/tool_choice/foreseen_finish.h"
 #include "engine/tool_choice/reach_ratio.h"
 #include "engine/tool_choice/select.h"
+#include "kernels/mesh/bulk_memory.h"
 
 namespace slabwright {
 
@@ -336,6 +337,7 @@ void limit_feeds(Operation& op, const Job& job) {
 
 PlannedLayer plan_layer(Context& context, const LayerGround& ground, std::size_t index,
                         ProgressPart& progress) {
+    const KeptMemory kept;  // one set of tools leaves it to the next
     return LayerPlanner(context, ground, index, progress).run();
 }
 

@@ -67,6 +67,24 @@ char* take_pages(std::size_t bytes) {
     return map_pages(bytes);
 }
 
+// Together with the pieces that lie before and after it.
+void keep_pages(Pages pages) {
+    for (std::size_t k = 0; k < kept_pages->size();) {
+        const Pages& piece = (*kept_pages)[k];
+        const bool before = piece.data + piece.bytes == pages.data,
+                   after = pages.data + pages.bytes == piece.data;
+        if (!before && !after) {
+            ++k;
+            continue;
+        }
+        if (before) pages.data = piece.data;
+        pages.bytes += piece.bytes;
+        (*kept_pages)[k] = kept_pages->back();
+        kept_pages->pop_back();
+    }
+    kept_pages->push_back(pages);
+}
+
 }  // namespace
 
 KeptMemory::KeptMemory() : outermost_(!kept_pages) {
@@ -102,7 +120,7 @@ void release_bulk(void* data, std::size_t bytes) noexcept {
     const Pages pages{reinterpret_cast<char*>(head), head->mapped};
     if (kept_pages) {
         try {
-            kept_pages->push_back(pages);
+            keep_pages(pages);
             return;
         } catch (const std::bad_alloc&) {}
     }
