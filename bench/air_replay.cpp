@@ -1,6 +1,6 @@
-// How much of a plan's feed motion cuts nothing: an independent replay of the emitted text on a grid of
-// heights. It shares no code with planner or proof: it reads LinuxCNC's words itself and knows flat, face and
-// ball cutters.
+// How much of a plan's feed motion cuts nothing, and how much meets more than cutting.max_engagement: an
+// independent replay of the emitted text on a grid of heights. It shares no code with planner or proof: it
+// reads LinuxCNC's words itself and knows flat, face and ball cutters.
 //     air_replay OUT [CELL_MM]        Markdown, a row for each kind of operation and each purpose
 #include <algorithm>
 #include <array>
@@ -28,6 +28,13 @@ struct Place {
     double x = 0, y = 0, z = 0;
 };
 
+/// What a cutter met at one place.
+struct Met {
+    bool any = false;
+    double width = 0;  ///< across its way, of its diameter: from the first to the last cell that stood well
+                       ///< above its tip
+};
+
 /// The slab of one layer, by the heights that stand at the middles of cells.
 class Wood {
 public:
@@ -39,47 +46,80 @@ public:
           ny_(static_cast<int>(std::ceil((y1 - y0) / cell))),
           height_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_), top) {}
 
-    /// Takes away what the cutter meets; whether there was anything.
-    bool cut(const Place& tip, double radius, bool ball) {
-        bool met = false;
-        const int j0 = row(tip.y - radius), j1 = row(tip.y + radius) + 1;
-        for (int j = std::max(0, j0); j <= std::min(ny_ - 1, j1); ++j) {
-            const double dy = y0_ + (j + 0.5) * cell_ - tip.y, wide2 = radius * radius - dy * dy;
-            if (wide2 <= 0) continue;
-            const double wide = std::sqrt(wide2);
-            const int i0 = std::max(0, column(tip.x - wide)),
-                      i1 = std::min(nx_ - 1, column(tip.x + wide) + 1);
-            float* at = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
-            for (int i = i0; i <= i1; ++i) {
-                const double dx = x0_ + (i + 0.5) * cell_ - tip.x, left2 = wide2 - dx * dx;
-                if (left2 <= 0) continue;
-                const auto low = static_cast<float>(ball ? tip.z + radius - std::sqrt(left2) : tip.z);
-                if (at[i] <= low) continue;
-                met = met || at[i] - low > kLowers;
-                at[i] = low;
+    /// Takes away what the cutter meets that came from `from` on a straight way, of which the same cutter has
+    /// taken all there.
+    Met cut(const Place& from, const Place& tip, double radius, bool ball) {
+        const double run = std::hypot(tip.x - from.x, tip.y - from.y);
+        Front front{.across_x = run > 0 ? -(tip.y - from.y) / run : 0,
+                    .across_y = run > 0 ? (tip.x - from.x) / run : 0};
+        const bool level = !ball && tip.z == from.z;
+        const int j0 = std::max(0, row(tip.y - radius)), j1 = std::min(ny_ - 1, row(tip.y + radius) + 1);
+        for (int j = j0; j <= j1; ++j) {
+            const double y = y0_ + (j + 0.5) * cell_;
+            const auto [i0, i1] = span(tip, y, radius);
+            const auto [k0, k1] = level ? span(from, y, radius) : std::pair{0, -1};
+            if (k0 > k1) {
+                cut_row(tip, y, j, i0, i1, radius, ball, front);
+                continue;
             }
+            cut_row(tip, y, j, i0, std::min(i1, k0 - 1), radius, ball, front);
+            cut_row(tip, y, j, std::max(i0, k1 + 1), i1, radius, ball, front);
         }
-        return met;
+        return {front.met, front.low > front.high ? 0 : (front.high - front.low + cell_) / (2 * radius)};
     }
 
 private:
+    static constexpr double kStands = 0.2;  // mm: less is no width
+    struct Front {
+        double across_x = 0, across_y = 0;
+        bool met = false;
+        double low = 1e9, high = -1e9;  // mm across the way
+    };
     [[nodiscard]] int row(double y) const { return static_cast<int>(std::floor((y - y0_) / cell_)); }
-    [[nodiscard]] int column(double x) const { return static_cast<int>(std::floor((x - x0_) / cell_)); }
+    /// The columns whose middles lie within the cutter's circle, on the slab.
+    [[nodiscard]] std::pair<int, int> span(const Place& tip, double y, double radius) const {
+        const double wide2 = radius * radius - (y - tip.y) * (y - tip.y);
+        if (wide2 <= 0) return {0, -1};
+        const double wide = std::sqrt(wide2);
+        return {std::max(0, static_cast<int>(std::ceil((tip.x - wide - x0_) / cell_ - 0.5))),
+                std::min(nx_ - 1, static_cast<int>(std::floor((tip.x + wide - x0_) / cell_ - 0.5)))};
+    }
+    void cut_row(const Place& tip, double y, int j, int i0, int i1, double radius, bool ball, Front& front) {
+        float* const at = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
+        const double dy = y - tip.y;
+        for (int i = i0; i <= i1; ++i) {
+            const double dx = x0_ + (i + 0.5) * cell_ - tip.x;
+            const double left2 = std::max(0.0, radius * radius - dx * dx - dy * dy);
+            const auto low = static_cast<float>(ball ? tip.z + radius - std::sqrt(left2) : tip.z);
+            if (at[i] <= low) continue;
+            front.met = front.met || at[i] - low > kLowers;
+            if (at[i] - low > kStands) {
+                const double across = dx * front.across_x + dy * front.across_y;
+                front.low = std::min(front.low, across), front.high = std::max(front.high, across);
+            }
+            at[i] = low;
+        }
+    }
     double x0_, y0_, cell_;
     int nx_, ny_;
     std::vector<float> height_;
 };
 
 struct Ways {
-    double feed = 0, air = 0;  // mm
-    void add(const Ways& w) { feed += w.feed, air += w.air; }
+    double feed = 0, air = 0, wide = 0;   // mm
+    double minutes = 0, air_minutes = 0;  // at the feed that is commanded
+    void add(const Ways& w) {
+        feed += w.feed, air += w.air, wide += w.wide;
+        minutes += w.minutes, air_minutes += w.air_minutes;
+    }
 };
 
 /// A program's motions, modal words and all.
 class Replay {
 public:
-    Replay(Wood& wood, double radius, bool ball, double cell)
-        : wood_(wood), radius_(radius), ball_(ball), step_(cell) {}
+    /// @param most of the cutter's diameter: where it meets more, the way counts as wide
+    Replay(Wood& wood, double radius, bool ball, double cell, double most)
+        : wood_(wood), radius_(radius), ball_(ball), step_(cell), most_(most + cell / radius) {}
 
     Ways run(std::istream& text) {
         std::string line;
@@ -107,6 +147,7 @@ private:
                 else if (value == 4 || value == 53 || value == 43) other = true;
             } else ++k;
         }
+        if (words.contains('F')) feed_ = words['F'];
         if (other || !(words.contains('X') || words.contains('Y') || words.contains('Z'))) return;
         Place to = at_;
         if (words.contains('X')) to.x = words['X'];
@@ -137,17 +178,24 @@ private:
     template <class At>
     void along(double length, const At& place) {
         const int steps = std::max(1, static_cast<int>(std::ceil(length / step_)));
-        for (int k = 1; k <= steps; ++k)
-            if (!wood_.cut(place(static_cast<double>(k) / steps), radius_, ball_))
-                ways_.air += length / steps;
+        Place from = at_;
+        for (int k = 1; k <= steps; ++k) {
+            const Place to = place(static_cast<double>(k) / steps);
+            const Met met = wood_.cut(from, to, radius_, ball_);
+            if (!met.any) ways_.air += length / steps, ways_.air_minutes += length / steps / feed_;
+            if (met.width > most_) ways_.wide += length / steps;
+            from = to;
+        }
         ways_.feed += length;
+        ways_.minutes += length / feed_;
     }
 
     Wood& wood_;
     double radius_;
     bool ball_;
-    double step_;
+    double step_, most_;
     int motion_ = 0;
+    double feed_ = 1;  // mm/min; a program says one before it cuts
     Place at_;
     Ways ways_;
 };
@@ -159,6 +207,7 @@ int print(const std::string& out, double cell) {
         machine.value("programs", "operation") != "operation")
         throw std::runtime_error("only LinuxCNC's programs in mm, one for each operation, are read");
     const double zero_x = plan.at("zero").at(0), zero_y = plan.at("zero").at(1);
+    const double most = plan.at("job").at("cutting").at("max_engagement");
     const bool from_top = plan.at("frame") == "layer-top";
     std::map<int, Json> tools;
     for (const Json& tool : plan.at("tools")) tools[tool.at("number").get<int>()] = tool;
@@ -181,7 +230,7 @@ int print(const std::string& out, double cell) {
                 return 2;
             }
             const Ways ways =
-                Replay(wood, tool.at("diameter").get<double>() / 2, tool.at("kind") == "ball", cell)
+                Replay(wood, tool.at("diameter").get<double>() / 2, tool.at("kind") == "ball", cell, most)
                     .run(text);
             const std::string kind = op.at("kind");
             kinds[kind].add(ways);
@@ -189,12 +238,16 @@ int print(const std::string& out, double cell) {
             all.add(ways);
         }
     }
-    std::printf("| operations | feed, m | in air, m | in air |\n|---|---|---|---|\n");
+    std::printf(
+        "| operations | feed, m | in air, m | in air | of the time | wider than %.2f "
+        "|\n|---|---|---|---|---|---|\n",
+        most);
     kinds["all"] = all;
     for (const auto& [kind, ways] : kinds)
         if (ways.feed > 0)
-            std::printf("| %s | %.1f | %.1f | %.1f %% |\n", kind.c_str(), ways.feed / 1000, ways.air / 1000,
-                        100 * ways.air / ways.feed);
+            std::printf("| %s | %.1f | %.1f | %.1f %% | %.1f %% | %.1f %% |\n", kind.c_str(),
+                        ways.feed / 1000, ways.air / 1000, 100 * ways.air / ways.feed,
+                        100 * ways.air_minutes / ways.minutes, 100 * ways.wide / ways.feed);
     return 0;
 }
 
