@@ -70,18 +70,28 @@ std::vector<char> which_cut(Context& context, const LayerStock& stock, const Cut
         const double y0 = part.y0 - wide.radius, y1 = part.y(rows - 1) + wide.radius;
         float* const height = heights.data() + grid.index(0, first);
         const StandingHeights standing{height, 0};
+        // Where a piece goes on from the one before, what the cutter covers there is known: looked at, with
+        // nothing to do, or taken away.
+        enum class Known { nothing, idle, cut } known = Known::nothing;
+        std::size_t next = 0;
         for (std::size_t p = 0; p < pieces.size(); ++p) {
             std::array<double, 3> from = pieces[p].from, to = pieces[p].to;
             if (std::max(from[1], to[1]) < y0 || std::min(from[1], to[1]) > y1) continue;
             from[2] -= stock.z_bottom();
             to[2] -= stock.z_bottom();
+            if (p != next || p == 0 || pieces[p].from != pieces[p - 1].to) known = Known::nothing;
+            next = p + 1;
             Over over{stock, height, grid.index(0, first), limit, kSteep * grid.cell};
-            sweep_above(part, wide, from, to, standing, over);
-            if (!over.more && !(over.wall && hides(pieces[p]))) continue;
+            sweep_above(part, wide, from, to, standing, over, {.been = known == Known::idle});
+            if (!over.more && !(over.wall && hides(pieces[p]))) {
+                known = over.wall ? Known::nothing : Known::idle;
+                continue;
+            }
             // Of a piece that several bands know, any may say so.
             std::atomic_ref(cuts[p]).store(1, std::memory_order_relaxed);
             Lowers lowers{height};
-            sweep_above(part, end, from, to, standing, lowers);
+            sweep_above(part, end, from, to, standing, lowers, {.been = known == Known::cut});
+            known = Known::cut;
         }
     });
     return cuts;
