@@ -152,6 +152,9 @@ public:
         for (std::size_t k = 0; k < left_over_.size(); ++k)
             if (LeftOver& cell = left_over_[k]; !on_floor(grid.index(cell.i, cell.j)))
                 cell.wall = blocks[block_of[k]].wall;
+        std::erase_if(left_over_, [](const LeftOver& cell) {
+            return cell.wall == std::numeric_limits<float>::infinity();
+        });
     }
 
     /// Whether a level has any, as things are. @param tip, over as for mark()
