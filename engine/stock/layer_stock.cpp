@@ -498,7 +498,7 @@ void LayerStock::cut_at(const CutterEnd& end, double x, double y, double tip_z) 
 }
 
 void LayerStock::cut_along(const CutterEnd& end, const std::array<double, 3>& from,
-                           const std::array<double, 3>& to) {
+                           const std::array<double, 3>& to, bool been) {
     float* const height = memory_.height.data();
     if (trial_ != nullptr) {
         const auto cell = [&](double mm, double begin, int cells) {
@@ -510,10 +510,6 @@ void LayerStock::cut_along(const CutterEnd& end, const std::array<double, 3>& fr
                            cell(std::min(from[1], to[1]) - end.radius, grid_.y0, grid_.ny),
                            cell(std::max(from[1], to[1]) + end.radius, grid_.y0, grid_.ny));
     }
-    const auto lower = [&](std::size_t c, double z) {
-        height[c] = std::min(height[c], static_cast<float>(std::max(0.0, z - z_bottom_)));
-    };
-    if (end.form != CutterEnd::Form::ball) return sweep(grid_, end, from, to, lower);
     // What stands a hair higher is asked too: heights over this bottom are compared, not z.
     constexpr double hair = 1e-3;
     struct LoweringTo {
@@ -526,7 +522,7 @@ void LayerStock::cut_along(const CutterEnd& end, const std::array<double, 3>& fr
             lower_to(height + first, n, h, bottom);
         }
     } lowering{height, z_bottom_};
-    sweep_above(grid_, end, from, to, StandingHeights{height, z_bottom_ + hair}, lowering);
+    sweep_above(grid_, end, from, to, StandingHeights{height, z_bottom_ + hair}, lowering, {.been = been});
 }
 
 }  // namespace slabwright

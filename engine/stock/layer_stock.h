@@ -113,7 +113,9 @@ public:
     /// Takes away what one place of a cutter covers.
     void cut_at(const CutterEnd& end, double x, double y, double tip_z);
     /// Takes away what a cutter covers whose tip goes straight between two places, mm.
-    void cut_along(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to);
+    /// @param been it has already taken away what it covers at the first
+    void cut_along(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to,
+                   bool been = false);
 
     [[nodiscard]] std::span<const float> heights() const { return memory_.height; }
 

@@ -526,7 +526,7 @@ private:
                 for (std::size_t p = 1; p < run.points.size(); ++p) {
                     const PathPoint &a = run.points[p - 1], &b = run.points[p];
                     stock_.cut_along(end, {to_mm(a.x), to_mm(a.y), to_mm(z)},
-                                     {to_mm(b.x), to_mm(b.y), to_mm(z)});
+                                     {to_mm(b.x), to_mm(b.y), to_mm(z)}, p > 1);
                 }
         }
     }
