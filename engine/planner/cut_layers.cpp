@@ -18,6 +18,7 @@
 #include "engine/schedule/keep_outs.h"
 #include "engine/stock/layer_stock.h"
 #include "engine/stock/standing.h"
+#include "engine/tool_choice/foreseen_finish.h"
 #include "engine/tool_choice/select.h"
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/errors.h"
@@ -147,7 +148,9 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
         3;  // what stands, and two earlier states of it while one way of cutting is held against another
     const ToolSelection& how = plan.job.selection;
     // One set of tools that leads, and one that is held against it.
-    const std::uint64_t sets = selects_tools(plan.job) && how.compare && how.foresee ? 2 : 1;
+    const bool races =
+        selects_tools(plan.job) && how.compare && how.foresee && finish_is_foreseeable(plan.job);
+    const std::uint64_t sets = races ? 2 : 1;
     return sets * held * (sizeof(SolidFacet) + 16 + 3 * sizeof(Index3)) +
            static_cast<std::uint64_t>(3 * plan_view_mm2(plan)) * (sizeof(Move) + 64) +
            sets *
