@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <span>
 
+#include "engine/paths/operations/level_targets.h"
 #include "engine/paths/operations/roughing.h"
 #include "engine/paths/runs/feet.h"
 #include "engine/paths/runs/rings.h"
@@ -22,14 +22,9 @@ namespace {
 
 constexpr double kStepShare = 0.45;  // of the diameter, between rings
 constexpr double kRingTolerance =
-    0.02;                             // mm, of the ring that keeps off the finished surface by its allowance
-constexpr double kSample = 0.4;       // mm between places of a ring that are looked at
-constexpr float kStands = 0.05F;      // mm over the tip: less is nothing to cut
-constexpr double kEdge = 0.05;        // mm: what only the cutter's very edge meets was cut on the ring before
-constexpr double kWorthOfBall = 0.5;  // mm that a ball must lower a cell by: its rings leave ridges
-constexpr int kLevelsAStep = 2;       // of a ball
-constexpr int kTile = 16;             // cells
-constexpr double kBlock = 0.125;      // of the swath of a wall: by how much it may be off
+    0.02;                        // mm, of the ring that keeps off the finished surface by its allowance
+constexpr double kSample = 0.4;  // mm between places of a ring that are looked at
+constexpr int kLevelsAStep = 2;  // of a ball
 constexpr int kMostRings = 4000;
 constexpr std::size_t kMostPairs =
     4'000'000;  // of cells and edges whose distance is asked for at once: some milliseconds
@@ -67,232 +62,6 @@ std::vector<std::vector<std::array<int, 2>>> rows_inside(const CellGrid& grid, c
     }
     return rows;
 }
-
-// The cells that are worth a visit, level by level.
-class LevelTargets {
-public:
-    LevelTargets(Context& context, const LayerStock& stock, double limit, const Tool& tool)
-        : stock_(stock),
-          limit_(limit),
-          radius_(clearing_radius(tool)),
-          ball_(tool.kind == ToolKind::ball),
-          reach_(1 + (static_cast<int>(radius_ / stock.grid().cell) + 1) / kTile),
-          tiles_x_((stock.grid().nx + kTile - 1) / kTile),
-          tiles_(static_cast<std::size_t>(tiles_x_) *
-                     static_cast<std::size_t>((stock.grid().ny + kTile - 1) / kTile),
-                 0),
-          near_(tiles_.size(), 0),
-          marked_(tiles_.size() * kTile, 0) {
-        // What is not left over now will not be on any level.
-        const CellGrid& grid = stock.grid();
-        std::vector<std::vector<LeftOver>> rows(static_cast<std::size_t>(grid.ny));
-        parallel_each(context, rows.size(), [&](std::size_t j) {
-            stock.each_left(static_cast<int>(j), limit, [&, row = static_cast<int>(j)](int i) {
-                rows[j].push_back({i, row});
-            });
-        });
-        for (const auto& row : rows) left_over_.insert(left_over_.end(), row.begin(), row.end());
-    }
-    [[nodiscard]] bool none() const { return left_over_.empty(); }
-    [[nodiscard]] std::uint64_t bytes() const {
-        return marked_.size() * sizeof(marked_[0]) +
-               left_over_.size() * (sizeof(left_over_[0]) + sizeof(cells_[0]));
-    }
-
-    /// From here on cells are left alone on levels on which they lie within the swath of walls, as seen from
-    /// the middle of the block that they are in.
-    /// @param wall   a flat cutter of the swath's radius: it cannot stand there
-    /// @param swath  mm
-    /// @param lowest mm above the layer's bottom, of all levels
-    /// @param floors mm; what stands on one of them is a target all the same, for no ball makes a floor
-    void leave_walls(Context& context, const DropIndex& wall, double swath, double lowest,
-                     std::span<const double> floors) {
-        const CellGrid& grid = stock_.grid();
-        const auto on_floor = [&](std::size_t c) {
-            const double z = stock_.z_bottom() + stock_.surface(c);
-            return std::any_of(floors.begin(), floors.end(),
-                               [&](double f) { return z <= f + 1e-3 && z >= f - kSameFloor - 1e-3; });
-        };
-        struct Block {
-            double x = 0, y = 0;  // mm, its middle
-            float highest = 0;    // mm above the layer's bottom, what stands in it
-            float wall = 0;
-        };
-        const int side = std::max(1, static_cast<int>(kBlock * swath / grid.cell));
-        std::vector<Block> blocks;
-        std::vector<std::uint32_t> block_of(left_over_.size());
-        // By column of blocks the latest; left_over_ goes row by row.
-        std::vector<std::array<std::int64_t, 2>> latest(static_cast<std::size_t>(grid.nx / side + 1),
-                                                        {-1, -1});
-        for (std::size_t k = 0; k < left_over_.size(); ++k) {
-            const auto [i, j, none] = left_over_[k];
-            const int column = i / side, row = j / side;
-            auto& [in_row, block] = latest[static_cast<std::size_t>(column)];
-            if (in_row != row) {
-                in_row = row, block = static_cast<std::int64_t>(blocks.size());
-                const double half = (side - 1) * grid.cell / 2;
-                blocks.push_back({grid.x(column * side) + half, grid.y(row * side) + half});
-            }
-            block_of[k] = static_cast<std::uint32_t>(block);
-            float& highest = blocks[block_of[k]].highest;
-            highest = std::max(highest, stock_.height(grid.index(i, j)));
-        }
-        constexpr std::size_t grain = 128;
-        parallel_for(context, blocks.size(), grain, [&](std::size_t begin, std::size_t end) {
-            MetPoints met;
-            for (std::size_t b = begin; b < end; ++b) {
-                // Beside a wall as high as what stands there no level has anything of it.
-                const std::optional<Rest> rest =
-                    wall.drop_within(blocks[b].x, blocks[b].y, stock_.z_bottom() + lowest,
-                                     stock_.z_bottom() + static_cast<double>(blocks[b].highest), &met);
-                blocks[b].wall = rest ? static_cast<float>(rest->tip_z - stock_.z_bottom())
-                                      : std::numeric_limits<float>::infinity();
-            }
-        });
-        for (std::size_t k = 0; k < left_over_.size(); ++k)
-            if (LeftOver& cell = left_over_[k]; !on_floor(grid.index(cell.i, cell.j)))
-                cell.wall = blocks[block_of[k]].wall;
-        std::erase_if(left_over_, [](const LeftOver& cell) {
-            return cell.wall == std::numeric_limits<float>::infinity();
-        });
-    }
-
-    /// Whether a level has any, as things are. @param tip, over as for mark()
-    [[nodiscard]] bool any(double tip, double over) const {
-        return std::any_of(left_over_.begin(), left_over_.end(), [&](const LeftOver& cell) {
-            return is_target(cell, static_cast<float>(tip), over);
-        });
-    }
-
-    /// Marks the cells of a level.
-    /// @param tip  mm above the layer's bottom
-    /// @param over mm above the layer's bottom: only what lies over a surface that is higher
-    void mark(double tip, double over) {
-        const CellGrid& grid = stock_.grid();
-        for (const auto& [i, j] : cells_) marked_[row_of(i, j)] = 0, tiles_[tile(i, j)] = 0;
-        for (const std::size_t t : near_tiles_) near_[t] = 0;
-        cells_.clear(), near_tiles_.clear();
-        tip_ = static_cast<float>(tip);
-        std::erase_if(left_over_,
-                      [&](const LeftOver& c) { return stock_.left(grid.index(c.i, c.j)) <= limit_; });
-        for (const LeftOver& cell : left_over_) {
-            if (!is_target(cell, tip_, over)) continue;
-            const auto [i, j, wall] = cell;
-            marked_[row_of(i, j)] |= static_cast<std::uint16_t>(1U << (i % kTile));
-            if (!tiles_[tile(i, j)]) come_near(i / kTile, j / kTile);
-            tiles_[tile(i, j)] = 1;
-            cells_.push_back({i, j});
-        }
-    }
-    [[nodiscard]] const std::vector<std::array<int, 2>>& cells() const { return cells_; }
-
-    // Whether a cutter whose middle is here meets one that still stands; a ball, one that it lowers by
-    // enough.
-    [[nodiscard]] bool met(double x, double y) {
-        const CellGrid& grid = stock_.grid();
-        const auto cell = [&](double at, double from, int n) {
-            return static_cast<int>(std::clamp((at - from) / grid.cell + 0.5, 0.0, n - 1.0));
-        };
-        if (!near_[tile(cell(x, grid.x0, grid.nx), cell(y, grid.y0, grid.ny))]) return false;
-        const double r = std::max(radius_ - kEdge, radius_ / 2);
-        if (meets_as_before(x, y, r)) return true;
-        const int j0 = std::max(0, static_cast<int>(std::ceil((y - r - grid.y0) / grid.cell)));
-        const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + r - grid.y0) / grid.cell)));
-        const int i0 = std::max(0, static_cast<int>(std::ceil((x - r - grid.x0) / grid.cell)));
-        const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((x + r - grid.x0) / grid.cell)));
-        for (int tj = j0 / kTile; tj <= j1 / kTile && j0 <= j1; ++tj)
-            for (int ti = i0 / kTile; ti <= i1 / kTile && i0 <= i1; ++ti) {
-                if (!tiles_[static_cast<std::size_t>(tj) * static_cast<std::size_t>(tiles_x_) +
-                            static_cast<std::size_t>(ti)])
-                    continue;
-                std::uint16_t* const rows = &marked_[row_of(ti * kTile, tj * kTile)];
-                for (int j = std::max(j0, tj * kTile); j <= std::min(j1, tj * kTile + kTile - 1); ++j) {
-                    if (rows[j % kTile] == 0) continue;
-                    const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, r * r - dy * dy));
-                    const int first =
-                        std::max(ti * kTile, static_cast<int>(std::ceil((x - w - grid.x0) / grid.cell)));
-                    const int last = std::min({ti * kTile + kTile - 1, grid.nx - 1,
-                                               static_cast<int>(std::floor((x + w - grid.x0) / grid.cell))});
-                    if (first > last) continue;
-                    const std::uint32_t asked =
-                        ((2U << (last % kTile)) - 1U) & ~((1U << (first % kTile)) - 1U);
-                    for (std::uint32_t left = rows[j % kTile] & asked; left != 0; left &= left - 1) {
-                        const int i = ti * kTile + std::countr_zero(left);
-                        const std::size_t c = grid.index(i, j);
-                        if (stock_.height(c) <= tip_ + kStands || (ball_ && !lowers_enough(c, 0, tip_))) {
-                            rows[j % kTile] &= static_cast<std::uint16_t>(
-                                ~(left & -left));  // nor does any place of the level lower it
-                            continue;
-                        }
-                        if (ball_ && !lowers_enough(c, (grid.x(i) - x) * (grid.x(i) - x) + dy * dy, tip_))
-                            continue;
-                        met_ = {i, j};
-                        return true;
-                    }
-                }
-            }
-        return false;
-    }
-
-private:
-    struct LeftOver {
-        int i = 0, j = 0;
-        float wall = -std::numeric_limits<float>::infinity();  // mm above the layer's bottom: on a level
-                                                               // below, a wall is near
-    };
-    [[nodiscard]] bool is_target(const LeftOver& cell, float tip, double over) const {
-        const std::size_t c = stock_.grid().index(cell.i, cell.j);
-        return stock_.height(c) > tip + kStands && stock_.surface(c) <= std::max(tip, 0.0F) + kStands &&
-               stock_.surface(c) > over + kStands && (!ball_ || lowers_enough(c, 0, tip)) && tip >= cell.wall;
-    }
-    [[nodiscard]] std::size_t tile(int i, int j) const {
-        return static_cast<std::size_t>(j / kTile) * static_cast<std::size_t>(tiles_x_) +
-               static_cast<std::size_t>(i / kTile);
-    }
-    // Of a cell's tile, the row that it is in.
-    [[nodiscard]] std::size_t row_of(int i, int j) const {
-        return tile(i, j) * kTile + static_cast<std::size_t>(j % kTile);
-    }
-    // Whether a ball at a level's height, its axis so far from a cell's middle (mm²), lowers it by what is
-    // worth it.
-    [[nodiscard]] bool lowers_enough(std::size_t c, double away2, float tip) const {
-        const double most = stock_.height(c) - kWorthOfBall;
-        if (stock_.surface(c) >= most || tip >= most) return false;
-        return tip + radius_ - std::sqrt(std::max(0.0, radius_ * radius_ - away2)) < most;
-    }
-    // Whether the one that was met last is met here too: places follow each other along a ring.
-    [[nodiscard]] bool meets_as_before(double x, double y, double r) const {
-        const CellGrid& grid = stock_.grid();
-        const double within = r - 1e-6;  // mm: what rounding decides is left to met()
-        const auto [i, j] = met_;
-        if (i < 0 || (marked_[row_of(i, j)] >> (i % kTile) & 1) == 0) return false;
-        const double dx = grid.x(i) - x, dy = grid.y(j) - y, away2 = dx * dx + dy * dy;
-        if (away2 > within * within) return false;
-        const std::size_t c = grid.index(i, j);
-        return stock_.height(c) > tip_ + kStands && (!ball_ || lowers_enough(c, away2, tip_));
-    }
-    // A cutter whose middle is in one of the tiles around may meet what is in this one.
-    void come_near(int ti, int tj) {
-        const int tiles_y = static_cast<int>(tiles_.size()) / tiles_x_;
-        for (int j = std::max(0, tj - reach_); j <= std::min(tiles_y - 1, tj + reach_); ++j)
-            for (int i = std::max(0, ti - reach_); i <= std::min(tiles_x_ - 1, ti + reach_); ++i)
-                if (const std::size_t t = tile(i * kTile, j * kTile); !near_[t])
-                    near_[t] = 1, near_tiles_.push_back(t);
-    }
-    const LayerStock& stock_;
-    double limit_, radius_;
-    bool ball_;
-    int reach_;  // of the cutter, tiles
-    float tip_ = 0;
-    int tiles_x_;
-    std::vector<char> tiles_;            // that hold targets
-    std::vector<char> near_;             // within reach of such
-    std::vector<std::uint16_t> marked_;  // tile after tile, row after row, a bit for each cell
-    std::vector<std::size_t> near_tiles_;
-    std::array<int, 2> met_{-1, 0};          // at the last place that met one
-    std::vector<LeftOver> left_over_;        // row after row
-    std::vector<std::array<int, 2>> cells_;  // the level's, row after row
-};
 
 // Millimetres from an outline's edges to the nearest of these cells' middles.
 double nearest(const CellGrid& grid, std::span<const std::array<int, 2>> cells, const Loops& outline) {
@@ -431,7 +200,7 @@ private:
         const double half_step = kStepShare * r_, ridge = r_ - std::sqrt(r_ * r_ - half_step * half_step);
         const double deepest = std::min(cut_.layer.z_bottom, cut_.layer.floor_below + pass_.allowance),
                      top = cut_.layer.z_top,
-                     bottom = std::max(cut_.layer.z_bottom - ridge - kStands, deepest);
+                     bottom = std::max(cut_.layer.z_bottom - ridge - kStandsOverLevel, deepest);
         const int steps =
             tool_.stepdown_max > 0
                 ? std::max(1, static_cast<int>(std::ceil((top - bottom) / tool_.stepdown_max - 1e-9)))
@@ -444,7 +213,7 @@ private:
         }
         // Walls that go on below the layer are met by its lower half too.
         if (const double under = std::max(cut_.layer.z_bottom - r_ + pass_.limit, deepest);
-            under < bottom - kStands)
+            under < bottom - kStandsOverLevel)
             levels.push_back({under});
         return levels;
     }
