@@ -101,8 +101,7 @@ Operation clear_between(const LayerCut& cut, LayerStock& stock, RestPass pass, d
     constexpr double kSpared = 0.6;   // of the time without
     // Of the waste: where more is far from walls, little is spared; where less is, sparing it is tried first.
     constexpr double kMostOff = 0.5, kLittleOff = 0.1;
-    constexpr double kSoon =
-        8.5e-4;  // min/mm2: of 160 layers whose waste went as soon none gained by sparing
+    constexpr double kSoon = 8.5e-4;  // min/mm²: no layer of 14 parts whose waste went as soon gained by it
     const Tool& tool = cut.layer.tools.finish;
     const double swath = kSwath * tool.diameter / 2,
                  off_walls = share_off_walls(cut, stock, pass.limit, swath);
