@@ -109,7 +109,7 @@ struct ToolCandidate {
 /// A set of tools that a layer was planned with.
 struct ToolSet {
     /// "selected" (LUO's choice), "fixed", "foreseen" (the fixed set with the ball that is foreseen to be the
-    /// fastest), "wider" or "narrower" (another finish tool), "wider rough" or "stiffer".
+    /// fastest), "wider" or "narrower" (another finish tool), "wider rough", "gentlest" or "stiffer".
     std::string name;
     std::vector<int> tools;  ///< numbers, in the order of their first cut
     double minutes = 0;  ///< of its programs, tool changes within the layer included; of the first of them

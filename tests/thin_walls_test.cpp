@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "engine/planner/planner.h"
+#include "engine/tools/libraries.h"
 #include "kernels/mesh/weld.h"
 #include "tests/mesh_shapes.h"
+#include "tests/support/height_field.h"
 
 using namespace slabwright;
 
@@ -43,6 +45,31 @@ std::vector<std::string> finishing(const Plan& plan) {
     return purposes;
 }
 
+/// What was planned for a layer of waves for a wide ball and one steep ridge, 1 mm wide at its crest.
+std::vector<ToolSet> sets_of(double strength_mpa) {
+    Context context;
+    const Mesh mesh = test::height_field(context, 120, 0.5, [](double x, double y) {
+        if (y > -6) return 9 + 4 * std::cos(x / 12) * std::cos((y + 6) / 12);
+        if (std::abs(x) > 22) return 3.0;
+        const double off = std::abs(y + 18);
+        return off < 0.5 ? 16.0 : std::max(3.0, 16 - 13 * (off - 0.5) / 0.5);
+    });
+    Job job;
+    job.tools = shop_library();
+    job.slabs.thicknesses = {19};
+    job.material.strength_mpa = strength_mpa;
+    job.bonding.accept_weak = true;
+    return make_plan(context, mesh, {}, job).layers.front().selection->sets;
+}
+std::size_t planned_whole(const std::vector<ToolSet>& sets) {
+    return static_cast<std::size_t>(
+        std::count_if(sets.begin(), sets.end(), [](const ToolSet& s) { return s.left_mm2.has_value(); }));
+}
+const ToolSet* named(const std::vector<ToolSet>& sets, const char* name) {
+    const auto at = std::find_if(sets.begin(), sets.end(), [&](const ToolSet& s) { return s.name == name; });
+    return at == sets.end() ? nullptr : &*at;
+}
+
 }  // namespace
 
 TEST(ThinWalls, AreFinishedBeforeTheFloorsThatWouldLoadThem) {
@@ -60,4 +87,19 @@ TEST(ThinWalls, AreFinishedBeforeTheFloorsThatWouldLoadThem) {
     EXPECT_LT(minutes(strong), 0.9 * strong_and_whole);
     EXPECT_LT(minutes(thin), 1.15 * strong_and_whole);
     EXPECT_LT(minutes(plan_of(0.8, 27)), 1.15 * strong_and_whole);
+}
+
+// Where thin walls break under the first set, the one that pushes least is asked; under which they break too,
+// no other is.
+TEST(ThinWalls, WhatNothingSavesIsNotPlannedWithEverySet) {
+    EXPECT_EQ(named(sets_of(27), "gentlest"), nullptr) << "wood that bears it";
+    const std::vector<ToolSet> saved = sets_of(4);
+    ASSERT_NE(named(saved, "gentlest"), nullptr);
+    EXPECT_EQ(named(saved, "gentlest")->reason.find("would bear"), std::string::npos);
+    EXPECT_NE(named(saved, "foreseen")->reason.find("would bear"), std::string::npos);
+    EXPECT_GT(planned_whole(saved), 2);
+    const std::vector<ToolSet> lost = sets_of(0.5);
+    ASSERT_NE(named(lost, "gentlest"), nullptr);
+    EXPECT_NE(named(lost, "gentlest")->reason.find("would bear"), std::string::npos);
+    EXPECT_EQ(planned_whole(lost), 2);
 }

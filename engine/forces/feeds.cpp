@@ -210,7 +210,11 @@ public:
             if (s.wall_n > 0)
                 if (const double wall = s.wall_load(bent()); wall > hardest.load)
                     hardest = {wall, bent().in_plane_n, wall_push(s, op_, tool_), s.wall_lost};
-            if (feed == s.feed) cuts.strain = std::max(cuts.strain, choice_.load(s, 1).side());
+            if (feed == s.feed) {
+                const CutLoad load = choice_.load(s, 1);
+                cuts.strain = std::max(cuts.strain, load.side());
+                cuts.cutter_strain = std::max(cuts.cutter_strain, load.cutter);
+            }
             if (!listed.insert({s.fine, static_cast<double>(feed)}).second) continue;
             cuts.cuts.push_back(segment_of(s.fine, choice_.cutting().idle(), tool_, feed, kFine));
             cuts.places.push_back(s.at);

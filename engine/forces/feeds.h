@@ -37,6 +37,7 @@ struct LayerCuts {
     std::vector<std::uint32_t> moves;          ///< and by which move
     std::vector<std::size_t> starts;           ///< of each operation's, and their end
     double strain = 0;  ///< the largest share of a limit of cutter, spindle or wall that is still borne
+    double cutter_strain = 0;  ///< of cutter and spindle alone
 };
 
 /// What the cuts of a plan's tools bear, for the layers of one plan to tell each other: most of a layer's

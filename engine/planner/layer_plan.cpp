@@ -130,7 +130,8 @@ private:
 
     // The ball that is foreseen to finish first, with the roughing cutters that clear the waste first; where
     // that bears more than it may, the next ball. By what it took other balls are foreseen again, and only
-    // one that should take less is tried, too.
+    // one that should take less is tried, too. Where it is thin walls that would break under the first, the
+    // set that pushes least is asked next: where they break under that, none is looked for that saves them.
     void follow_the_foreseen(const LayerTools& selected) {
         const ForeseenFinish finish(context_, trials_.layer(), selected.finish);
         for (ToolCandidate& candidate : selection_->candidates)
@@ -143,9 +144,17 @@ private:
             race(ball, selected, at, to);
             at = to;
             tried.push_back(ball.number);
-            if (!best_->strained || tried.size() == kRaces) break;
+            if (tried.size() == 1 && best_->only_walls) {
+                gentlest_ = try_the_gentlest(finish, selected, at);
+                if (sets_[*gentlest_].strained) return;
+            }
+            if (!slow_or_strained() || tried.size() == kRaces) break;
         }
         if (best_->strained) return;
+        if (slow_or_strained()) {
+            try_sets(0, at, 1);
+            return;
+        }
         // After one that was not faster, another only where it should be clearly so.
         for (const double share : {1.0, 0.96}) {
             const LayerTools& best = sets_[chosen_].tools;
@@ -159,6 +168,22 @@ private:
             try_sets(first, at, to, kBehind);
             at = to;
         }
+    }
+    // Whether there is no better one than that which pushes least, or none that holds.
+    [[nodiscard]] bool slow_or_strained() const { return best_->strained || chosen_ == gentlest_; }
+    // The smallest ball, after the narrowest roughing cutter.
+    std::size_t try_the_gentlest(const ForeseenFinish& finish, const LayerTools& selected, double at) {
+        const std::vector<Tool> balls = finish.ranked();
+        const Tool& ball = *std::min_element(
+            balls.begin(), balls.end(), [](const Tool& a, const Tool& b) { return a.diameter < b.diameter; });
+        LayerTools tools = with_finish(fixed_tools(trials_.job()), ball);
+        if (same(selected.finish, ball) && selected.rough.diameter < tools.rough.diameter) tools = selected;
+        add("gentlest", tools);
+        std::size_t s = 0;
+        while (!same(sets_[s].tools, tools)) ++s;
+        ProgressPart none(progress_, at, at);
+        if (!sets_[s].tried) try_set(s, none, PaceAhead{}.times);
+        return s;
     }
     void race(const Tool& ball, const LayerTools& selected, double from, double to) {
         const LayerTools fixed = fixed_tools(trials_.job()), base = with_finish(fixed, ball);
@@ -235,7 +260,7 @@ private:
     // Where what is best bears more than it may, all that was given up is planned whole, and then stiffer
     // tools.
     void hold() {
-        if (!best_->strained) return;
+        if (!best_->strained || gentlest_) return;
         add("fixed", fixed_tools(trials_.job()));
         try_sets(0, 1, 1);
         if (!best_->strained) return;
@@ -320,8 +345,9 @@ private:
     std::vector<NamedSet> sets_;
     std::optional<LayerSelection> selection_;
     std::optional<Trial> best_;
-    std::size_t chosen_ = 0, first_ = 0;  // of the sets: the best; the first that was planned whole
-    double allowed_left_ = 0;             // mm²
+    std::size_t chosen_ = 0, first_ = 0;   // of the sets: the best; the first that was planned whole
+    std::optional<std::size_t> gentlest_;  // where thin walls asked for it
+    double allowed_left_ = 0;              // mm²
 };
 
 }  // namespace

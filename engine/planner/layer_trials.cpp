@@ -153,6 +153,7 @@ Trial LayerTrials::with_forces(LayerResult result, const TrialLimits& limits) {
     trial.floors_slowed = walls_ && floor_minutes(layer, job.machine) > kSlowed * floors;
     if (compared_ || walls_) trial.minutes = minutes_of(layer, job.machine);
     trial.strained = trial.planned.cuts.strain > kStrained;
+    trial.only_walls = trial.strained && trial.planned.cuts.cutter_strain <= kStrained;
     return trial;
 }
 

@@ -22,6 +22,7 @@ struct Trial {
     bool leaves_more = false;        ///< than it may
     bool whole = true;               ///< false: given up, its feeds were not adapted
     bool strained = false;           ///< cutter, spindle or a thin wall bear more than they may
+    bool only_walls = false;         ///< and of them only thin walls
 };
 
 /// When a set of tools is not followed any further.
