@@ -35,11 +35,22 @@ double max_layer_of_longest(const Job& job) {
     return std::min(flat, ball);
 }
 
+namespace {
+
+// Between pattern and flask, for a cutter so wide to pass, mm.
+double gap_for(const Job& job, double diameter) {
+    constexpr double kRoom = 2.5;  // the leads of finish passes swing out by 2
+    return diameter + job.cutting.wall_allowance + kRoom;
+}
+
+}  // namespace
+
 Job with_tools_for(const Job& job, double height) {
     Job fitted = job;
     constexpr double same = 1e-3;  // mm; layers keep to their limits within less
     std::erase_if(fitted.tools, [&](const Tool& tool) {
-        return is_end_mill(tool.kind) && max_layer_of(job, tool) < height - same;
+        return is_end_mill(tool.kind) && (max_layer_of(job, tool) < height - same ||
+                                          (job.flask.enabled && job.flask.gap < gap_for(job, tool.diameter)));
     });
     return fitted;
 }
@@ -124,11 +135,15 @@ double rough_fit(const Cutting& cutting) {
 }
 
 double least_flask_gap(const Job& job) {
-    constexpr double kRoom = 2.5;  // mm: the leads of finish passes swing out by 2
-    double widest = 0;
-    for (const Tool& tool : job.tools)
-        if (is_end_mill(tool.kind)) widest = std::max(widest, tool.diameter);
-    return widest + job.cutting.wall_allowance + kRoom;
+    const auto narrowest = [&](bool ball) {
+        double least = 0;  // none
+        for (const Tool& tool : job.tools)
+            if (is_end_mill(tool.kind) && (tool.kind == ToolKind::ball) == ball &&
+                (least == 0 || tool.diameter < least))
+                least = tool.diameter;
+        return least;
+    };
+    return gap_for(job, std::max(narrowest(false), narrowest(true)));
 }
 
 FeatureOptions feature_options(const Job& job) {

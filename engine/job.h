@@ -411,7 +411,7 @@ struct Job {
 /// The tallest layer for which the job has a flat and a ball end mill that make it, whatever its others do.
 [[nodiscard]] double max_layer_of_longest(const Job& job);
 
-/// The job without those flat and ball end mills that do not make a layer of this height.
+/// The job without the end mills that are too short for a layer of this height or too wide for flask.gap.
 [[nodiscard]] Job with_tools_for(const Job& job, double height);
 
 /// By how much the machine may round corners of roughing paths, mm: Cutting::rough_blend, but no more than a
@@ -441,8 +441,8 @@ struct Job {
 /// what roughing leaves.
 [[nodiscard]] double rough_fit(const Cutting& cutting);
 
-/// The narrowest flask.gap in which every flat and ball end mill of the job passes between pattern and flask:
-/// the widest cutter, what roughing leaves on the pattern's walls, and room for leads.
+/// The narrowest flask.gap in which a flat and a ball end mill of the job pass between pattern and flask: the
+/// wider one of the narrowest of each, what roughing leaves on the pattern's walls, and room for leads.
 [[nodiscard]] double least_flask_gap(const Job& job);
 
 /// What the job asks of the feature finders.

@@ -313,7 +313,8 @@ void validate_flask(const Job& job) {
     if (f.enabled && f.gap < least_flask_gap(job))
         refuse("flask.gap",
                fmt::format("flask.gap is {}: the cutters do not pass between pattern and flask", f.gap),
-               fmt::format("give at least {} (the widest end mill, the wall allowance and room)",
+               fmt::format("give at least {} (the narrowest flat or ball end mill, whichever is wider, the "
+                           "wall allowance and room)",
                            least_flask_gap(job)));
     if (f.enabled && !(f.wall > 2 * job.bonding.edge_setback))
         refuse("flask.wall",

@@ -74,6 +74,12 @@ std::string pattern_formats() {
     return missing.empty() ? built : built + "; not built: " + missing;
 }
 
+Job default_job() {
+    Job job;
+    job.tools = shop_library();
+    return job;
+}
+
 Job read_job(const std::string& path, const std::string& tool_library, const std::string& post) {
     return guarded([&] {
         const std::string text = path.empty()
@@ -84,7 +90,7 @@ Job read_job(const std::string& path, const std::string& tool_library, const std
         const std::filesystem::path beside = std::filesystem::path(path).parent_path();
         const std::filesystem::path folder = tool_library.empty() ? beside : std::filesystem::path();
         const std::filesystem::path posts = post.empty() ? beside : std::filesystem::path();
-        return parse_job(text, path, {},
+        return parse_job(text, path, default_job(),
                          {[&](const std::string& name, const std::vector<std::int64_t>& wanted) {
                               return read_tool_library(folder / name, wanted);
                           },

@@ -1,7 +1,7 @@
 // The front door of the library: the one header that an embedder includes.
 //
 //     slabwright::Context context({.threads = 2});
-//     slabwright::Job job;                                   // or read_job("job.toml")
+//     slabwright::Job job = slabwright::default_job();       // or read_job("job.toml")
 //     slabwright::Plan plan = slabwright::plan(context, "pattern.stl", job);
 //     slabwright::write(context, plan, "out");
 //
@@ -38,7 +38,12 @@ namespace slabwright {
 /// "; not built: STEP".
 [[nodiscard]] SLABWRIGHT_API std::string pattern_formats();
 
-/// Reads a job file (TOML), "" for none, and the tool library and the post file that it names beside it.
+/// The job that the command begins with: a shop's eight tools (io/JOB.md), chosen layer by layer, all else as
+/// in `Job{}`, which has the three tools of the fixed set.
+[[nodiscard]] SLABWRIGHT_API Job default_job();
+
+/// Reads a job file (TOML), "" for none, and the tool library and the post file that it names beside it. What
+/// it leaves out is as in default_job().
 /// @param tool_library a file of tools, or the name of a library of the house, instead of [tools] library
 /// (io/JOB.md)
 /// @param post a control, or a post file (io/FORMATS.md), instead of machine.post
@@ -55,12 +60,12 @@ namespace slabwright {
 /// errors
 /// @throws as read_job()
 [[nodiscard]] SLABWRIGHT_API Job job_from_toml(std::string_view toml, const std::string& name,
-                                               const Job& base = {});
+                                               const Job& base = default_job());
 
-/// All keys with their defaults and comments, as a job file. @param library whose tools it lists: "fixed"
-/// (the default), "shop", "metric", or "luo" for the tools of LUO table 5.4 (io/JOB.md)
+/// All keys with their defaults and comments, as a job file. @param library whose tools it lists: "shop" (the
+/// default), "fixed", "forms", "metric", or "luo" for the tools of LUO table 5.4 (io/JOB.md)
 /// @throws Error(usage, "job.library") for another name
-[[nodiscard]] SLABWRIGHT_API std::string default_job_toml(std::string_view library = "fixed");
+[[nodiscard]] SLABWRIGHT_API std::string default_job_toml(std::string_view library = "shop");
 
 /// Reads the pattern and plans the build. @throws Error(input | no_plan | cancelled | usage)
 [[nodiscard]] SLABWRIGHT_API Plan plan(Context& context, const PatternSource& source, const Job& job);

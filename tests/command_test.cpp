@@ -126,8 +126,8 @@ TEST(Command, KeepsMemoryWithinWhatMayBeUsed) {
     };
     const auto memory = [&](const char* gib) -> Memory {
         const CommandResult made =
-            slabwright_command({"plan", stl, "-o", folder / "out", "--allow-undercut", "--no-verify",
-                                "--quiet", "--threads", "2", "--memory", gib},
+            slabwright_command({"plan", stl, "-o", folder / "out", "--tools", "fixed", "--allow-undercut",
+                                "--no-verify", "--quiet", "--threads", "2", "--memory", gib},
                                {{"MALLOC_CONF", "stats_print:true,stats_print_opts:Jgdablxeh"}});
         EXPECT_EQ(made.exit, 0) << made.err;
         std::smatch purged;

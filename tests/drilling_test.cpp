@@ -96,7 +96,7 @@ std::map<std::pair<double, double>, double> lowest_at(const std::string& program
 TEST(Drilling, HolesOfADrillsSizeAreDrilledLayerByLayerAndProven) {
     const TemporaryFolder folder;
     support::spit(folder / "plate.stl", drilled_plate());
-    support::spit(folder / "job.toml", job_with_drills(run({"job", "--defaults"}).out));
+    support::spit(folder / "job.toml", job_with_drills(run({"job", "--defaults", "--library", "fixed"}).out));
     const std::string out = folder / "out";
     const CommandResult planned =
         run({"plan", folder / "plate.stl", "-o", out, "--job", folder / "job.toml", "--allow-undercut"});
@@ -135,7 +135,8 @@ TEST(Drilling, HolesOfADrillsSizeAreDrilledLayerByLayerAndProven) {
     EXPECT_TRUE(proof["passed"].get<bool>());
     EXPECT_TRUE(proof["violations"].empty());
     // Nothing is left in the holes that were drilled.
-    const CommandResult bare = run({"plan", folder / "plate.stl", "-o", folder / "bare", "--allow-undercut"});
+    const CommandResult bare =
+        run({"plan", folder / "plate.stl", "-o", folder / "bare", "--tools", "fixed", "--allow-undercut"});
     ASSERT_EQ(bare.exit, 0) << bare.err;
     const json milled = json::parse(support::slurp(folder / "bare" + "/verify.json"));
     const double drilled = kPi * (9 + 16 + 9);
@@ -149,7 +150,7 @@ TEST(Drilling, HolesOfADrillsSizeAreDrilledLayerByLayerAndProven) {
 TEST(Drilling, ADrillThatGoesTooDeepOrAsideIsFoundInTheText) {
     const TemporaryFolder folder;
     support::spit(folder / "plate.stl", drilled_plate());
-    support::spit(folder / "job.toml", job_with_drills(run({"job", "--defaults"}).out));
+    support::spit(folder / "job.toml", job_with_drills(run({"job", "--defaults", "--library", "fixed"}).out));
     const std::string out = folder / "out";
     ASSERT_EQ(
         run({"plan", folder / "plate.stl", "-o", out, "--job", folder / "job.toml", "--allow-undercut"}).exit,
@@ -279,7 +280,7 @@ TEST(Drilling, WhatIsNotDrilledSaysWhy) {
     for (const double diameter : {5.9, 6.1, 14.0}) cell(diameter);
     const TemporaryFolder folder;
     support::spit(folder / "plate.stl", stl_bytes("plate", test::rounded(plate.closed())));
-    std::string job = job_with_drills(run({"job", "--defaults"}).out);
+    std::string job = job_with_drills(run({"job", "--defaults", "--library", "fixed"}).out);
     job.replace(job.rfind("\ndiameter = 8.0"), 15, "\ndiameter = 14.0");
     support::spit(folder / "job.toml", job);
     const std::string out = folder / "out";

@@ -2,6 +2,7 @@
 // room for it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -32,6 +33,11 @@ Job with_flask() {
     job.flask.enabled = true;
     job.flask.draft_deg = 2;
     return job;
+}
+
+double diameter_of(const Job& job, int number) {
+    return std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == number; })
+        ->diameter;
 }
 
 double distance_to(const Loops& region, Point2 p) {
@@ -287,6 +293,31 @@ std::string refusal(const Job& job, const char* code, ErrorKind kind) {
     }
     ADD_FAILURE() << "planned, though " << code << " was due";
     return {};
+}
+
+// A flat of 1 in would cut the flask of a gap of 20 mm, which narrower ones clear.
+TEST(FlaskPlan, CuttersThatDoNotPassStayInTheMagazine) {
+    Context context;
+    Job job = with_flask();
+    job.tools = default_job().tools;
+    const support::TemporaryFolder folder;
+    const std::string stl = model("half-sphere"), out = folder / "out";
+    const Plan made = plan(context, stl, job);
+    for (const Layer& layer : made.layers)
+        for (const Operation& op : layer.operations)
+            if (op.kind != OperationKind::face) {
+                EXPECT_LT(diameter_of(job, op.tool), 16) << op.purpose;
+            }
+    write(context, made, out);
+    VerifyOptions options;
+    options.source = stl;
+    const Verification v = verify_folder(context, out, options);
+    for (const Violation& violation : v.report.violations)
+        ADD_FAILURE() << violation.code << ' ' << violation.message << ' ' << violation.file;
+    for (const LayerFindings& f : v.report.layers)
+        EXPECT_LT(f.waste_mm3, 1) << "stock stands between pattern and flask";
+    job.flask.gap = 5;
+    EXPECT_NE(refusal(job, "job.range", ErrorKind::usage).find("flask.gap"), std::string::npos);
 }
 
 TEST(FlaskPlan, SaysWhatRoomIsMissing) {

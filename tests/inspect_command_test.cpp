@@ -173,7 +173,7 @@ TEST(InspectCommand, TellsNarrowCavitiesAndTheirTools) {
         Context context({.threads = 1});
         write_stl(stl, weld(context, walls));
     }
-    const CommandResult told = slabwright_command({"inspect", stl, "--json"});
+    const CommandResult told = slabwright_command({"inspect", stl, "--tools", "fixed", "--json"});
     ASSERT_EQ(told.exit, 0) << told.err;
     EXPECT_EQ(schema_complaint(told.out, kSchema), "");
     const json cavities = json::parse(told.out).at("cavities");
@@ -184,7 +184,7 @@ TEST(InspectCommand, TellsNarrowCavitiesAndTheirTools) {
     EXPECT_NEAR(slot.at("where")[0].get<double>(), 37.5, 1e-3);
     EXPECT_TRUE(slot.at("tool").is_null());
     EXPECT_EQ(slot.at("missing").at("diameter"), 5);
-    const CommandResult people = slabwright_command({"inspect", stl});
+    const CommandResult people = slabwright_command({"inspect", stl, "--tools", "fixed"});
     EXPECT_NE(people.out.find("5.00 mm wide, 15.50 deep (3.1 times)"), std::string::npos) << people.out;
     EXPECT_NE(people.out.find("flat end mill 5 mm x "), std::string::npos) << people.out;
     const CommandResult metric = slabwright_command({"inspect", stl, "--tools", "metric"});

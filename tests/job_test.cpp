@@ -448,8 +448,8 @@ TEST(Job, RoughBlendStaysWithinTheAllowances) {
     EXPECT_FALSE(is_valid([](Job& j) { j.cutting.rough_blend = 0.01; }));
 }
 
-// Of the end mills the widest must pass between flask and pattern, with its allowance and 2.5 mm for leads.
-TEST(Job, AFlaskLeavesRoomForTheWidestEndMill) {
+// A flat and a ball end mill must pass between flask and pattern, with their allowance and 2.5 mm for leads.
+TEST(Job, AFlaskLeavesRoomForAFlatAndABall) {
     Job job;
     job.cutting.wall_allowance = 0.5;
     job.tools = {tool_of_kind(job, ToolKind::face), tool_of_kind(job, ToolKind::flat),
@@ -458,6 +458,9 @@ TEST(Job, AFlaskLeavesRoomForTheWidestEndMill) {
     EXPECT_EQ(least_flask_gap(job), 19);
     job.tools[1].diameter = 0.5, job.tools[2].diameter = 0.75;
     EXPECT_EQ(least_flask_gap(job), 3.75);
+    job.tools.push_back(job.tools[1]);
+    job.tools.back().diameter = 25;
+    EXPECT_EQ(least_flask_gap(job), 3.75) << "wider ones may stay outside";
 }
 
 // Unless it is stated, the base board is cut as deep as the largest ball reaches below the pattern.

@@ -299,7 +299,7 @@ TEST(Magazine, AFolderProvesItself) {
     const support::TemporaryFolder folder;
     const std::string out = folder / "out", pattern = support::checkout("tests/data/pump-cover.stl");
     Context context;
-    const Job job = job_from_toml("[machine]\nmagazine = 2\n", "job");
+    const Job job = job_from_toml("[machine]\nmagazine = 2\n", "job", Job{});
     const Plan made = plan(context, PatternSource(pattern), job);
     EXPECT_GT(made.totals.magazine_swaps, 0);
     write(context, made, out, PatternSource(pattern));

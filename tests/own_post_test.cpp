@@ -376,7 +376,7 @@ TEST(OwnPost, AFolderTellsOfADamagedProgramOrPost) {
     const std::string out = folder / "out";
     Context context;
     const PatternSource source(kModel);
-    write(context, plan(context, source, read_job("", {}, folder / "router.toml")), out);
+    write(context, plan(context, source, read_job("", "fixed", folder / "router.toml")), out);
     const auto told = [&] {
         try {
             const SimulationReport report = verify_folder(context, out, {.source = source, .cell = 1}).report;

@@ -206,8 +206,15 @@ TEST(ToolLibrary, TheHousesOwnAreKnownByName) {
             EXPECT_EQ(job_toml(one), job_toml(three)) << name;
         }
     }
-    EXPECT_EQ(job_toml(Job{}), default_job_toml("fixed")) << "the default, unchanged";
-    EXPECT_EQ(default_job_toml(), default_job_toml("fixed"));
+    EXPECT_EQ(job_toml(Job{}), default_job_toml("fixed"));
+}
+
+TEST(ToolLibrary, TheShopsIsTheDefault) {
+    EXPECT_EQ(default_job_toml(), default_job_toml("shop"));
+    EXPECT_EQ(job_toml(default_job()), default_job_toml());
+    EXPECT_EQ(job_toml(read_job("")), default_job_toml());
+    EXPECT_EQ(job_toml(job_from_toml("", "nothing")), default_job_toml());
+    EXPECT_EQ(job_toml(read_job("", "fixed")), job_toml(Job{}));
 }
 
 TEST(ToolLibrary, AListedToolGoesBeforeTheHousesOwn) {

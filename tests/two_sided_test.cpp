@@ -360,11 +360,11 @@ TEST_F(TwoSided, CommandsSayWhatTheyCannotDo) {
         arguments.insert(arguments.begin(), support::built_command());
         return support::run_command(arguments);
     };
-    // The option brings two dowels a joint with it; those of 8 mm are too narrow for the fixed library.
+    // The option brings two dowels a joint with it; those of 8 mm are too narrow for the shop's tools.
     const support::CommandResult other =
         told({"plan", built_->stl, "--sides", "two", "-o", built_->folder / "other"});
     EXPECT_EQ(other.exit, 2) << other.err;
-    EXPECT_NE(other.err.find("or take dowels.diameter = 18, whose holes T2 makes"), std::string::npos)
+    EXPECT_NE(other.err.find("or take dowels.diameter = 10, whose holes T5 makes"), std::string::npos)
         << other.err;
     const support::CommandResult quoted = told({"quote", built_->stl, "--sides", "two"});
     EXPECT_EQ(quoted.exit, 0) << quoted.err;

@@ -11,15 +11,16 @@ CLI::App* add_job_command(CLI::App& app, JobOptions& options) {
     what->add_option("--post-file", options.post_file,
                      "print a post file that writes as this control's own dialect does");
     what->require_option(1);
-    command->add_option("--library", options.library,
-                        "with these tools: fixed, shop, forms, metric, or luo (Luo table 5.4)");
+    command->add_option(
+        "--library", options.library,
+        "with these tools instead of the shop's: fixed, forms, metric, or luo (Luo table 5.4)");
     command->add_flag("--json", options.json, "errors as JSON on stderr");
     return command;
 }
 
 std::string run_job(const JobOptions& options) {
     if (!options.post_file.empty()) return post_file_toml(options.post_file);
-    return default_job_toml(options.library.empty() ? "fixed" : options.library);
+    return default_job_toml(options.library.empty() ? "shop" : options.library);
 }
 
 }  // namespace slabwright

@@ -13,6 +13,7 @@
 #include "engine/schedule/blanks.h"
 #include "engine/schedule/fit.h"
 #include "engine/schedule/glue_path.h"
+#include "engine/tool_choice/select.h"
 #include "engine/tools/tools.h"
 #include "engine/undersides/underside_target.h"
 #include "kernels/cutting/cusp.h"
@@ -43,7 +44,10 @@ struct Rates {
     double place = 2.441;  // min
     double turn = 0.0259;  // min a radian: machines slow down where an outline turns
 };
-constexpr Rates kRates{};
+/// Chosen tools clear wider, and reach into narrow places and between thin walls, which the fixed set leaves:
+/// so many times its minutes, fitted likewise to plans with the shop's tools.
+constexpr double kChosen = 0.918, kChosenNarrow = 2.076;
+
 constexpr double kSmallPlace = 150;  // mm: a loop so long counts as half a place
 constexpr double kSeenTurn = 0.03;   // mm from a loop's chords, within which it may turn
 constexpr double kChanges = 3.2;     // of tools in a layer
@@ -53,6 +57,16 @@ constexpr double kHandlings = 4;     // of a slab that is milled from below
 constexpr double kBelow = 0.8;
 constexpr double kThin = 8;          // mm: walls that are thinner count
 constexpr double kSeenWidth = 0.05;  // mm, to which widths of wood and air are measured
+
+Rates rates_of(const Job& job) {
+    Rates rates;
+    if (!selects_tools(job)) return rates;
+    for (double Rates::*const rate :
+         {&Rates::facing, &Rates::roughing, &Rates::contours, &Rates::raster, &Rates::place, &Rates::turn})
+        rates.*rate *= kChosen;
+    for (double Rates::*const rate : {&Rates::narrow, &Rates::thin}) rates.*rate *= kChosenNarrow;
+    return rates;
+}
 
 /// Ways of one kind in all layers, mm.
 struct Ways {
@@ -371,20 +385,20 @@ void reckon_layers(const Plan& plan, const Box3& box, std::span<const SectionCou
 
 /// What the ways take on the machine.
 std::vector<QuotedWork> work_of(const Ways& ways, const LayerTools& tools, const Tool& face,
-                                const Machine& machine) {
+                                const Rates& rates, const Machine& machine) {
     std::vector<QuotedWork> found;
     const auto work = [&](std::string_view name, double mm, const Tool& tool, double rate) {
         const double ideal = mm / std::min(tool.max_feed, machine.max_feed);
         found.push_back({name, ideal, rate * ideal});
     };
-    work("facing", ways.facing, face, kRates.facing);
-    work("roughing", ways.roughing, tools.rough, kRates.roughing);
-    work("contours", ways.contours, tools.finish, kRates.contours);
-    work("raster", ways.raster, tools.finish, kRates.raster);
-    work("thin walls", ways.thin, tools.finish, kRates.thin);
-    work("narrow places", ways.narrow, tools.rough, kRates.narrow);
-    found.push_back({"places", ways.places, kRates.place * ways.places});
-    found.push_back({"turns", 0, kRates.turn * ways.turns});
+    work("facing", ways.facing, face, rates.facing);
+    work("roughing", ways.roughing, tools.rough, rates.roughing);
+    work("contours", ways.contours, tools.finish, rates.contours);
+    work("raster", ways.raster, tools.finish, rates.raster);
+    work("thin walls", ways.thin, tools.finish, rates.thin);
+    work("narrow places", ways.narrow, tools.rough, rates.narrow);
+    found.push_back({"places", ways.places, rates.place * ways.places});
+    found.push_back({"turns", 0, rates.turn * ways.turns});
     return found;
 }
 
@@ -406,6 +420,7 @@ Quote quote(Context& context, MeshView mesh, const Job& asked) {
     const std::vector<double>& tops = found.layers.tops;
     const LayerTools tools = fixed_tools(job);
     const Tool& face = face_mill(job);
+    const Rates rates = rates_of(job);
     Quote result;
     result.outcome = found.layers.lying;
     result.stock = {plan.stock_max[0] - plan.stock_min[0], plan.stock_max[1] - plan.stock_min[1]};
@@ -423,14 +438,14 @@ Quote quote(Context& context, MeshView mesh, const Job& asked) {
         tell_unmade(unmade_air(context, *found.gaps, milled), job.tolerances.undercut, result.outcome);
         result.undersides = Undersides(context, mesh, plan).add(milled, tools, face, below);
     }
-    result.work = work_of(ways, tools, face, job.machine);
+    result.work = work_of(ways, tools, face, rates, job.machine);
     result.cutting_minutes = minutes_of(result.work);
     const double changes = changes_of(job.machine) * job.machine.tool_change_s / 60;
     result.tool_change_minutes = changes * static_cast<double>(tops.size());
     // A slab is taken, laid on the spoil board, held there and turned.
     if (result.undersides > 0)
         result.underside_minutes =
-            kBelow * minutes_of(work_of(below, tools, face, job.machine)) +
+            kBelow * minutes_of(work_of(below, tools, face, rates, job.machine)) +
             result.undersides * (changes + kHandlings * job.bonding.handling_s / 3 / 60);
     result.build_minutes = result.cutting_minutes + result.bonding_minutes + result.tool_change_minutes +
                            result.underside_minutes;

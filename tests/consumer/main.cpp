@@ -61,7 +61,7 @@ int main(int argc, char** argv) {
     if (argc != 2) return 2;
     try {
         slabwright::Context context({.threads = 2});
-        const slabwright::Job job;
+        const slabwright::Job job = slabwright::default_job();
         const slabwright::Plan of_file = slabwright::plan(context, argv[1], job);
         std::printf("slabwright %s: %zu layers\n", slabwright::version().c_str(), of_file.layers.size());
         if (!makes_sense(of_file)) return 1;
