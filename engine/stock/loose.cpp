@@ -1,7 +1,7 @@
 // Backwards in time the slab grows: every move puts back what it cut through. Pieces only ever join, so a
 // union-find follows them. A piece that hangs on nothing, and is joined to what is held by putting back one
 // move's cut, is what that move cut off. All that is held is one piece from the start, and nearly every cell
-// is put back beside it.
+// is put back beside it. How thick a piece is then, the moves up to that one tell, run forwards.
 #include "engine/stock/loose.h"
 
 #include <algorithm>
@@ -39,13 +39,13 @@ public:
     static constexpr std::uint32_t kNone = kNever, kHeld = 0;
     struct Piece {
         std::uint64_t cells = 0, i = 0, j = 0;  // and the sums of their columns and rows
-        bool cut_at_all = true;                 // whether all of its cells are cut through some time
+        std::size_t cell = 0;                   // one of them
     };
 
     Pieces() : parent_{kHeld}, pieces_(1) {}
-    [[nodiscard]] std::uint32_t make() {
+    [[nodiscard]] std::uint32_t make(std::size_t cell) {
         parent_.push_back(static_cast<std::uint32_t>(parent_.size()));
-        pieces_.emplace_back();
+        pieces_.push_back({.cell = cell});
         ++hanging_;
         return parent_.back();
     }
@@ -63,7 +63,6 @@ public:
         to.cells += from.cells;
         to.i += from.i;
         to.j += from.j;
-        to.cut_at_all &= from.cut_at_all;
         return a;
     }
     [[nodiscard]] Piece& operator[](std::uint32_t root) { return pieces_[root]; }
@@ -87,8 +86,7 @@ public:
           memory_(context, grid_.count() * (3 * sizeof(std::uint32_t) + sizeof(float) + 1), "loose pieces"),
           when_(grid_.count(), kNever),
           holds_(grid_.count(), 0),
-          of_(grid_.count(), Pieces::kNone),
-          web_(slab.z_top - slab.z_bottom) {}
+          of_(grid_.count(), Pieces::kNone) {}
 
     std::vector<LoosePiece> run(std::span<const Operation> operations, std::span<const Tool> tools,
                                 double smallest_mm2) {
@@ -103,10 +101,19 @@ public:
             first = last;
         }
         std::reverse(found_.begin(), found_.end());
-        return std::move(found_);
+        if (!found_.empty()) measure(operations, tools);
+        std::vector<LoosePiece> pieces;
+        for (const Found& f : found_) pieces.push_back(f.piece);
+        return pieces;
     }
 
 private:
+    struct Found {
+        LoosePiece piece;
+        std::size_t cell = 0;     // one of its own
+        std::uint32_t count = 0;  // of the move that cut it off
+    };
+
     static CellGrid grid_of(const HeldSlab& slab, double cell) {
         const double width = slab.max[0] - slab.min[0], depth = slab.max[1] - slab.min[1];
         if (!(cell > 0)) cell = std::max(1.0, std::sqrt(width * depth / kMostCells));
@@ -115,7 +122,7 @@ private:
                 std::max(1, static_cast<int>(std::ceil(depth / cell - 0.5)))};
     }
 
-    // When cells are cut through first, and how thick the slab still is when the last level begins.
+    // When cells are cut through first.
     void cut_through(std::span<const Operation> operations, std::span<const Tool> tools) {
         BulkVector<float> uncut(grid_.count(), std::numeric_limits<float>::max());
         for (std::size_t o = 0; o < operations.size(); ++o) {
@@ -129,8 +136,6 @@ private:
                 const Move &a = op.moves[i - 1], &b = op.moves[i];
                 if (b.feed == 0) continue;
                 const double low = to_mm(std::min(a.z, b.z)) - slab_.z_bottom;
-                if (op.kind == OperationKind::rough && a.z == b.z && low > kThrough)
-                    web_ = std::min(web_, low);
                 if (low > kThrough) continue;
                 CutThrough through{when_.data(), uncut.data(), slab_.z_bottom + kThrough,
                                    static_cast<std::uint32_t>(place_.size())};
@@ -185,14 +190,13 @@ private:
             last = below;
             piece = piece == Pieces::kNone ? pieces_.root(below) : pieces_.join(piece, pieces_.root(below));
         }
-        if (piece == Pieces::kNone) piece = pieces_.make();
+        if (piece == Pieces::kNone) piece = pieces_.make(row + begin);
         std::fill(of_.data() + row + begin, of_.data() + row + end, piece);
         Pieces::Piece& p = pieces_[piece];
         const std::size_t n = end - begin;
         p.cells += n;
         p.i += n * (begin + end - 1) / 2;
         p.j += n * (row / nx_);
-        p.cut_at_all = false;
     }
 
     // The others in the order in which they are put back: the last move's first; of one move's by number.
@@ -233,9 +237,11 @@ private:
             const double area = cells * grid_.cell * grid_.cell;
             if (area < smallest_mm2 || pieces_.root(beside_[k]) != Pieces::kHeld) continue;
             const auto [o, i] = place_[when_[order_[first]]];
-            found_.push_back({area, p.cut_at_all ? web_ : slab_.z_top - slab_.z_bottom,
-                              grid_.x0 + grid_.cell * (static_cast<double>(p.i) / cells),
-                              grid_.y0 + grid_.cell * (static_cast<double>(p.j) / cells), o, i});
+            found_.push_back({{area, slab_.z_top - slab_.z_bottom,
+                               grid_.x0 + grid_.cell * (static_cast<double>(p.i) / cells),
+                               grid_.y0 + grid_.cell * (static_cast<double>(p.j) / cells), o, i},
+                              p.cell,
+                              when_[order_[first]]});
         }
     }
     void put_back(std::size_t c) {
@@ -246,13 +252,61 @@ private:
             p = pieces_.root(p);
             piece = piece == Pieces::kNone ? p : pieces_.join(piece, p);
         });
-        if (piece == Pieces::kNone) piece = pieces_.make();
+        if (piece == Pieces::kNone) piece = pieces_.make(c);
         of_[c] = piece;
         if (piece == Pieces::kHeld) return;
         Pieces::Piece& p = pieces_[piece];
         ++p.cells;
         p.i += i;
         p.j += c / nx_;
+    }
+
+    // What stands over the layer's bottom where a piece is, once the move that cuts it off has been made.
+    void measure(std::span<const Operation> operations, std::span<const Tool> tools) {
+        BulkVector<float> height(grid_.count(), static_cast<float>(slab_.z_top));
+        const auto lower = [&](std::size_t cell, double z) {
+            height[cell] = std::min(height[cell], static_cast<float>(z));
+        };
+        auto next = found_.begin();
+        for (std::size_t o = 0; o < operations.size() && next != found_.end(); ++o) {
+            const Operation& op = operations[o];
+            const auto tool =
+                std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+            if (op.kind == OperationKind::face || tool == tools.end()) continue;
+            context_.throw_if_cancelled();
+            const CutterEnd end = cutter_end(*tool);
+            for (std::size_t i = 1; i < op.moves.size() && next != found_.end(); ++i) {
+                const Move &a = op.moves[i - 1], &b = op.moves[i];
+                if (b.feed == 0) continue;
+                sweep_above(grid_, end, {to_mm(a.x), to_mm(a.y), to_mm(a.z)},
+                            {to_mm(b.x), to_mm(b.y), to_mm(b.z)}, StandingHeights{height.data(), 0}, lower,
+                            {});
+                for (; next != found_.end() && next->piece.operation == o && next->piece.move == i; ++next)
+                    next->piece.thickness_mm = std::max(0.0, highest(*next, height) - slab_.z_bottom);
+            }
+        }
+    }
+    // Of the cells of a piece, which hang together and are cut through later or never.
+    [[nodiscard]] double highest(const Found& found, const BulkVector<float>& height) const {
+        std::vector<char> seen(grid_.count(), 0);
+        std::vector<std::size_t> open{found.cell};
+        seen[found.cell] = 1;
+        float most = std::numeric_limits<float>::lowest();
+        const auto look_at = [&](std::size_t c) {
+            if (seen[c] != 0 || holds_[c] != 0 || (when_[c] != kNever && when_[c] <= found.count)) return;
+            seen[c] = 1;
+            open.push_back(c);
+        };
+        while (!open.empty()) {
+            const std::size_t c = open.back(), i = c % nx_;
+            open.pop_back();
+            most = std::max(most, height[c]);
+            if (i > 0) look_at(c - 1);
+            if (i + 1 < nx_) look_at(c + 1);
+            if (c >= nx_) look_at(c - nx_);
+            if (c + nx_ < height.size()) look_at(c + nx_);
+        }
+        return most;
     }
 
     Context& context_;
@@ -263,14 +317,13 @@ private:
     BulkVector<std::uint32_t> when_;
     BulkVector<char> holds_;
     BulkVector<std::uint32_t>
-        of_;      // by cell: its piece, or what has become a part of one; none: not there yet
-    double web_;  // mm
+        of_;  // by cell: its piece, or what has become a part of one; none: not there yet
     std::vector<std::pair<std::size_t, std::size_t>> place_;  // of each counted move
     BulkVector<std::uint32_t> order_;                         // of cells
     Pieces pieces_;
     std::vector<std::uint32_t> beside_;  // pieces that hang on nothing, next to what a move puts back
     std::vector<Pieces::Piece> before_;
-    std::vector<LoosePiece> found_;
+    std::vector<Found> found_;
 };
 
 }  // namespace

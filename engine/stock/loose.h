@@ -23,7 +23,7 @@ struct HeldSlab {
 /// A piece that nothing holds any more, when that happens.
 struct LoosePiece {
     double area_mm2 = 0;
-    double thickness_mm = 0;              ///< at most
+    double thickness_mm = 0;              ///< of what stands of it over the layer's bottom then, at most
     double x = 0, y = 0;                  ///< its centroid, mm
     std::size_t operation = 0, move = 0;  ///< that cut it off
 };

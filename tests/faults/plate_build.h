@@ -39,7 +39,9 @@ struct PlateBuild {
         shapes::append(facets, shapes::box({4, 3, 6}, {26, 17, height}));
         write_stl(part, weld(context, facets));
     }
-    [[nodiscard]] std::vector<std::string> plan() const { return with({"plan", part, "-o", out, "--quiet"}); }
+    [[nodiscard]] std::vector<std::string> plan() const {
+        return with({"plan", part, "-o", out, "--tools", "fixed", "--quiet"});
+    }
     [[nodiscard]] std::vector<std::string> verify() const { return with({"verify", out, "--stl", part}); }
     [[nodiscard]] std::vector<std::string> report() const { return with({"report", out, "--stl", part}); }
     [[nodiscard]] std::vector<std::string> resume(std::vector<std::string> options) const {
