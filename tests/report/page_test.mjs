@@ -364,7 +364,9 @@ check.equal('a limit that cannot be kept is refused', refused, 2);
     await page.close();
 }
 check.equal('selection: no tables without a choice', await (async () => {
-    const {page} = await open(started, file);
+    const fixed = `${work}/fixed`;
+    execFileSync(command, ['plan', `${source}/tests/data/half-sphere.stl`, '-o', fixed, '--tools', 'fixed', '--quiet', '--no-verify']);
+    const {page} = await open(started, `${fixed}/report.html`);
     const count = await page.locator('#candidates, #sets').count();
     await page.close();
     return count;
