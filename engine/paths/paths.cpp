@@ -142,13 +142,15 @@ void report_loose(const LayerCut& cut, LayerResult& result) {
     if (!layer.opening.empty()) {
         slab.kept = unite(slab.kept, subtract(cut.stock_outline(), layer.opening));
     }
+    constexpr double kLight = 100;  // mm³, .07 g of MDF: a film or a splinter that the extraction takes
     for (const LoosePiece& piece : loose_pieces(cut.context, slab, result.operations, cut.job.tools))
-        result.diagnostics.push_back({Severity::warning, "waste.loose",
-                                      fmt::format("layer {}: a piece of waste of {:.0f} mm², up to {:.1f} mm "
-                                                  "thick, comes loose while the {} are cut",
-                                                  layer.index, piece.area_mm2, piece.thickness_mm,
-                                                  result.operations[piece.operation].purpose),
-                                      std::array<double, 3>{piece.x, piece.y, layer.z_bottom}});
+        result.diagnostics.push_back(
+            {piece.area_mm2 * piece.thickness_mm < kLight ? Severity::note : Severity::warning, "waste.loose",
+             fmt::format("layer {}: a piece of waste of {:.0f} mm², up to {:.1f} mm "
+                         "thick, comes loose while the {} are cut",
+                         layer.index, piece.area_mm2, piece.thickness_mm,
+                         result.operations[piece.operation].purpose),
+             std::array<double, 3>{piece.x, piece.y, layer.z_bottom}});
 }
 
 void report_no_way_in(const LayerCut& cut, LayerResult& result) {
