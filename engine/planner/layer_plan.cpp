@@ -260,7 +260,7 @@ private:
     // Where what is best bears more than it may, all that was given up is planned whole, and then stiffer
     // tools.
     void hold() {
-        if (!best_->strained || gentlest_) return;
+        if (!best_->strained || (gentlest_ && sets_[*gentlest_].strained)) return;
         add("fixed", fixed_tools(trials_.job()));
         try_sets(0, 1, 1);
         if (!best_->strained) return;
