@@ -122,9 +122,10 @@ private:
                 std::max(1, static_cast<int>(std::ceil(depth / cell - 0.5)))};
     }
 
-    // When cells are cut through first.
-    void cut_through(std::span<const Operation> operations, std::span<const Tool> tools) {
-        BulkVector<float> uncut(grid_.count(), std::numeric_limits<float>::max());
+    // Calls fn(operation, move, end of its cutter, place before, place after) for every move that cuts, in
+    // order. Face milling cuts nothing through.
+    template <class Fn>
+    void each_cut(std::span<const Operation> operations, std::span<const Tool> tools, Fn&& fn) const {
         for (std::size_t o = 0; o < operations.size(); ++o) {
             const Operation& op = operations[o];
             const auto tool =
@@ -132,22 +133,31 @@ private:
             if (op.kind == OperationKind::face || tool == tools.end()) continue;
             context_.throw_if_cancelled();
             const CutterEnd end = cutter_end(*tool);
-            for (std::size_t i = 1; i < op.moves.size(); ++i) {
-                const Move &a = op.moves[i - 1], &b = op.moves[i];
-                if (b.feed == 0) continue;
-                const double low = to_mm(std::min(a.z, b.z)) - slab_.z_bottom;
-                if (low > kThrough) continue;
-                CutThrough through{when_.data(), uncut.data(), slab_.z_bottom + kThrough,
-                                   static_cast<std::uint32_t>(place_.size())};
-                place_.emplace_back(o, i);
-                // Where a level move of a flat cutter begins, the move before it has cut all that the cutter
-                // covers.
-                const bool been = i > 1 && op.moves[i - 1].feed != 0 && a.z == b.z;
-                sweep_above(grid_, end, {to_mm(a.x), to_mm(a.y), to_mm(a.z)},
-                            {to_mm(b.x), to_mm(b.y), to_mm(b.z)}, StandingHeights{uncut.data(), 0}, through,
-                            {.been = been && end.form == CutterEnd::Form::flat});
-            }
+            for (std::size_t i = 1; i < op.moves.size(); ++i)
+                if (op.moves[i].feed != 0) fn(o, i, end, op.moves[i - 1], op.moves[i]);
         }
+    }
+    template <class Fn>
+    void sweep_cut(const CutterEnd& end, const Move& a, const Move& b, float* height, Fn& fn,
+                   bool been) const {
+        sweep_above(grid_, end, {to_mm(a.x), to_mm(a.y), to_mm(a.z)}, {to_mm(b.x), to_mm(b.y), to_mm(b.z)},
+                    StandingHeights{height, 0}, fn, {.been = been});
+    }
+
+    // When cells are cut through first.
+    void cut_through(std::span<const Operation> operations, std::span<const Tool> tools) {
+        BulkVector<float> uncut(grid_.count(), std::numeric_limits<float>::max());
+        each_cut(operations, tools,
+                 [&](std::size_t o, std::size_t i, const CutterEnd& end, const Move& a, const Move& b) {
+                     if (to_mm(std::min(a.z, b.z)) - slab_.z_bottom > kThrough) return;
+                     CutThrough through{when_.data(), uncut.data(), slab_.z_bottom + kThrough,
+                                        static_cast<std::uint32_t>(place_.size())};
+                     place_.emplace_back(o, i);
+                     // Where a level move of a flat cutter begins, the move before it has cut all that the
+                     // cutter covers.
+                     const bool been = i > 1 && a.feed != 0 && a.z == b.z;
+                     sweep_cut(end, a, b, uncut.data(), through, been && end.form == CutterEnd::Form::flat);
+                 });
     }
 
     void mark_held() {
@@ -268,23 +278,14 @@ private:
             height[cell] = std::min(height[cell], static_cast<float>(z));
         };
         auto next = found_.begin();
-        for (std::size_t o = 0; o < operations.size() && next != found_.end(); ++o) {
-            const Operation& op = operations[o];
-            const auto tool =
-                std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == op.tool; });
-            if (op.kind == OperationKind::face || tool == tools.end()) continue;
-            context_.throw_if_cancelled();
-            const CutterEnd end = cutter_end(*tool);
-            for (std::size_t i = 1; i < op.moves.size() && next != found_.end(); ++i) {
-                const Move &a = op.moves[i - 1], &b = op.moves[i];
-                if (b.feed == 0) continue;
-                sweep_above(grid_, end, {to_mm(a.x), to_mm(a.y), to_mm(a.z)},
-                            {to_mm(b.x), to_mm(b.y), to_mm(b.z)}, StandingHeights{height.data(), 0}, lower,
-                            {});
-                for (; next != found_.end() && next->piece.operation == o && next->piece.move == i; ++next)
-                    next->piece.thickness_mm = std::max(0.0, highest(*next, height) - slab_.z_bottom);
-            }
-        }
+        each_cut(operations, tools,
+                 [&](std::size_t o, std::size_t i, const CutterEnd& end, const Move& a, const Move& b) {
+                     if (next == found_.end()) return;
+                     sweep_cut(end, a, b, height.data(), lower, false);
+                     for (; next != found_.end() && next->piece.operation == o && next->piece.move == i;
+                          ++next)
+                         next->piece.thickness_mm = std::max(0.0, highest(*next, height) - slab_.z_bottom);
+                 });
     }
     // Of the cells of a piece, which hang together and are cut through later or never.
     [[nodiscard]] double highest(const Found& found, const BulkVector<float>& height) const {
