@@ -57,8 +57,8 @@ enum class RoughPattern : std::uint8_t { contour, zigzag };
 enum class RestPattern : std::uint8_t { by_library, raster, contour };
 /// Whether tools are chosen layer by layer (LUO 5.5), or every layer is cut with the fixed set.
 enum class SelectionMode : std::uint8_t { select, fixed };
-/// How much of a layer a tool reaches: by the length of its sections that a disc of the tool's radius
-/// touches; by area in 3D, shank and holder included; or by length on sections as printed (LUO 5.5.1).
+/// How much of a layer a tool reaches: by area in 3D, shank and holder included; by the length of sections
+/// that a disc of the tool's radius touches; or by length on sections as printed (LUO 5.5.1).
 enum class AccessRule : std::uint8_t { sections, exact, printed };
 /// The L from which the roughing stepdown follows (LUO 5.5.3.3): the finish tool's radius,
 /// tolerances.rough_cusp, or the smaller.
@@ -303,7 +303,7 @@ struct Cutting {
 /// is nothing to choose.
 struct ToolSelection {
     SelectionMode mode = SelectionMode::select;
-    AccessRule accessibility = AccessRule::sections;
+    AccessRule accessibility = AccessRule::exact;
     double threshold = 0.975;   ///< AR that a finish tool must have (LUO 5.6)
     double overlap_weight = 2;  ///< W of the printed AR
     RoughLimit rough_limit = RoughLimit::smaller;

@@ -374,6 +374,54 @@ TEST(Accessibility, OfRandomPartsAgainstDensePlaces) {
     EXPECT_LT(open, (reached + missed) / 2);
 }
 
+// Where a limit is asked about, points dealt evenly tell: they lie within their likely error of what all of
+// the surface gives, on the same side of the limit, and where the limit is far they are few.
+TEST(Accessibility, OfPointsDealtEvenlyLiesWithinItsLikelyErrorOfTheWhole) {
+    constexpr std::uint64_t seed = 20261130;
+    std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
+    std::mt19937_64 random(seed);
+    Context context;
+    constexpr double z_top = 9.75;
+    double squares = 0;
+    int asked = 0, decided = 0, few = 0;
+    for (int part = 0; part < 20; ++part) {
+        const Mesh mesh = random_part(context, random, part);
+        const AccessScene scene(context, mesh.view());
+        for (const ToolShape& tool : {flat(2.2), ball(1.8), ball(0.6)}) {
+            AccessOptions options;
+            options.tolerance = 0.05;
+            options.spacing = 0.7;
+            const Accessibility whole = scene.accessible(context, 0, z_top, tool, options);
+            options.spacing = 0;
+            for (const double limit : {0.2, 0.5, 0.8, 0.975}) {
+                options.limit = limit;
+                const Accessibility told = scene.accessible(context, 0, z_top, tool, options);
+                const double off = told.ratio() - whole.ratio();
+                EXPECT_GT(told.likely_error, 0);
+                EXPECT_LT(std::abs(off), 4.5 * told.likely_error + 0.004)
+                    << "part " << part << " of " << name_of(tool.cutter.form()) << " limit " << limit;
+                EXPECT_NEAR(told.area + told.undercut, whole.area + whole.undercut, 1e-6 * whole.area);
+                squares += off * off / (told.likely_error * told.likely_error);
+                ++asked;
+                if (std::abs(whole.ratio() - limit) > 6 * told.likely_error + 0.004) {
+                    EXPECT_EQ(told.ratio() > limit, whole.ratio() > limit)
+                        << "part " << part << " limit " << limit;
+                    ++decided;
+                }
+                if (std::abs(whole.ratio() - limit) > 0.15) {
+                    EXPECT_LE(told.points, 512u) << "part " << part << " limit " << limit;
+                    ++few;
+                }
+            }
+        }
+    }
+    std::printf("%d asked, %d far from their limit, %d very far; off by %.2f likely errors\n", asked, decided,
+                few, std::sqrt(squares / asked));
+    EXPECT_LT(std::sqrt(squares / asked), 1.2);
+    EXPECT_GT(decided, 200);
+    EXPECT_GT(few, 110);
+}
+
 // Whatever a larger tool reaches a smaller one of the same kind reaches too, if neither has shank or holder.
 // The larger one gets half the tolerance, for what is missed is missed with half of it only; without
 // refinement both are asked about the same points.

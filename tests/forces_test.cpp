@@ -324,6 +324,41 @@ TEST(Forces, EngagementArcOfWidths) {
     EXPECT_THROW((void)engagement_arc(1, std::nan(""), MillingSense::up), Error);
 }
 
+// Why a slot is cut in rings and not in the loops of a trochoid (METHOD.md section 9): where it has to bear
+// less, several passes, each as deep, take a shorter way than ever narrower ones, whatever the wood.
+TEST(Forces, OfASlotFallFasterByDepthThanByWidth) {
+    std::mt19937_64 random(24);
+    for (int trial = 0; trial < 300; ++trial) {
+        CutSegment slot = random_cut(random, CutterForm::flat);
+        slot.low_mm = 0;
+        slot.arc = {0, kPi};
+        const double diameter = 2 * slot.radius_mm, depth = slot.high_mm;
+        for (const double share : {0.7, 0.5, 0.3, 0.2, 0.1, 0.05}) {
+            CutSegment narrow = slot;
+            narrow.arc = engagement_arc(slot.radius_mm, share * diameter, MillingSense::down);
+            const double bears = closed_form_forces(narrow).peak_in_plane_n;
+            int passes = 1;
+            for (CutSegment shallow = slot; passes < 1000; ++passes) {
+                shallow.high_mm = depth / passes;
+                if (closed_form_forces(shallow).peak_in_plane_n <= bears * (1 + 1e-3)) break;
+            }
+            // A loop for each `share` of the diameter, each at least half a turn about a slot's middle.
+            EXPECT_LE(passes, std::max(1.0, std::ceil(1 / share))) << "trial " << trial << " width " << share;
+        }
+    }
+    // In MDF, by a shop's 1/2 in flat end mill.
+    CutSegment slot = slot_of_luo();
+    slot.high_mm = 19;
+    slot.chip_load_mm = 0.2;
+    slot.coefficients =
+        resolve_coefficients({8.8575, 1.1268, 0.6188, 2.4948}, kPi / 6, CoefficientTransform::oblique);
+    const double most = closed_form_forces(slot).peak_in_plane_n;
+    for (const auto& [share, bears] : {std::pair{0.5, 0.9}, std::pair{0.2, 0.5}, std::pair{0.1, 0.35}}) {
+        slot.arc = engagement_arc(slot.radius_mm, share * 2 * slot.radius_mm, MillingSense::down);
+        EXPECT_NEAR(closed_form_forces(slot).peak_in_plane_n / most, bears, 0.02) << share;
+    }
+}
+
 TEST(Forces, SegmentsOutOfRangeAreRefused) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     auto refused = [](auto&& spoil) {

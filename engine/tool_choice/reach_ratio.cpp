@@ -27,6 +27,18 @@ AccessOptions access_options(const Job& job, double lowest_tip) {
     return options;
 }
 
+namespace {
+
+// AR without the digits that its likely error makes meaningless; not so far off that it would come to lie on
+// the other side of a limit which decided (AccessOptions::limit).
+double in_known_digits(const Accessibility& found) {
+    if (!(found.likely_error > 0)) return found.ratio();
+    const double digit = std::pow(10.0, std::floor(std::log10(found.likely_error)));
+    return std::round(found.ratio() / digit) * digit;
+}
+
+}  // namespace
+
 ReachRatio reach_ratio(Context& context, const LayerJob& layer, const AccessScene* scene) {
     if (layer.job->selection.accessibility == AccessRule::sections) return {};
     return [&context, &layer, scene](const Tool& tool) {
@@ -38,7 +50,8 @@ ReachRatio reach_ratio(Context& context, const LayerJob& layer, const AccessScen
         auto ratio = [&](const Tool& t) {
             AccessOptions options = access_options(job, layer.floor_below);
             options.limit = job.selection.threshold;
-            return scene->accessible(context, layer.z_bottom, layer.z_top, shape_of(t), options).ratio();
+            return in_known_digits(
+                scene->accessible(context, layer.z_bottom, layer.z_top, shape_of(t), options));
         };
         double share = ratio(tool);
         if (tool.kind == ToolKind::ball && share < job.selection.threshold)

@@ -149,10 +149,10 @@ private:
             if (ar >= threshold) candidate.reason = "the largest that reaches enough";
             else if (last)
                 candidate.reason =
-                    fmt::format("none reaches the share of {:.4f}; this is the smallest", threshold);
+                    fmt::format("none reaches the share of {:.4g}; this is the smallest", threshold);
             else
                 candidate.reason =
-                    fmt::format("reaches {:.4f} of the surface, less than {:.4f}", ar, threshold);
+                    fmt::format("reaches {:.4g} of the surface, less than {:.4g}", ar, threshold);
             if (candidate.chosen) return tool;
         }
         return tools.back();

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -25,6 +27,10 @@ constexpr double kShared =
     1.5;  // of a point's distance from the corner: within it other pieces' points are hoped to be
 constexpr int kMostLevels = 40;  // of halving
 constexpr std::size_t kPiecesAtOnce = 128;
+constexpr std::array<std::size_t, 3> kPolls{512, 2048, 8192};  // points that may tell about a limit
+constexpr double kPointsASquare = 16;  // of the spacing, where a surface is taken piece by piece: at least
+constexpr std::size_t kPointsAtOnce = 64;
+constexpr double kSurely = 4;  // likely errors from a limit
 
 /// A piece of a facet, in doubles.
 struct Piece {
@@ -207,6 +213,14 @@ Point3 mixed(const Triangle& t, double a, double b, double c) {
     return p;
 }
 Point3 middle_of(const Triangle& t) { return mixed(t, 1.0 / 3, 1.0 / 3, 1.0 / 3); }
+/// The k-th of points that fill a triangle evenly: the R2 sequence (Roberts), folded over the diagonal.
+Point3 scattered(const Triangle& t, std::size_t k) {
+    constexpr double first = 0.7548776662466927, second = 0.5698402909980532;  // 1/g, 1/g²: g³ = g + 1
+    double u = std::fmod(0.5 + static_cast<double>(k) * first, 1.0),
+           v = std::fmod(0.5 + static_cast<double>(k) * second, 1.0);
+    if (u + v > 1) u = 1 - u, v = 1 - v;
+    return mixed(t, 1 - u - v, u, v);
+}
 
 /// Tests a piece at its middle and just within its corners.
 Areas measure(ReachSearcher& searcher, const ReachQuestion& q, const Piece& piece, const Point3& n,
@@ -275,9 +289,12 @@ public:
     }
 
     Accessibility run(std::size_t facets) {
+        if (options_.limit > 0 && !options_.shares)
+            for (const std::size_t points : kPolls)
+                if (const std::optional<Accessibility> sure = poll(points)) return *sure;
         std::vector<Piece> border = std::move(work_.pieces);
         std::vector<Areas> shares;
-        double total = 0, on_border = 0, disagreeing = 0, disagreeing2 = 0;
+        double total = 0, on_border = 0, disagreeing = 0, disagreeing2 = 0, error = 0;
         for (int level = 0; level < kMostLevels && !border.empty(); ++level) {
             std::vector<Outcome> outcomes = test(border, level == 0);
             border.clear();
@@ -300,12 +317,14 @@ public:
                 disagreeing2 += outcome.mixed2;
                 counts_.add(outcome.counts);
             }
-            const double error = std::sqrt(squares + disagreeing2) / 2;
+            error = std::sqrt(squares + disagreeing2) / 2;
             if (error <= options_.accuracy * (total + on_border) || squares <= disagreeing2) break;
             if (options_.limit > 0 && surely_decided(shares, error)) break;
         }
         for (std::size_t i = 0; i < border.size(); ++i) of_item_[border[i].item].add(shares[i]);
-        return result(facets, on_border + disagreeing);
+        Accessibility found = result(facets, on_border + disagreeing);
+        if (found.area > 0) found.likely_error = error / found.area;
+        return found;
     }
 
 private:
@@ -387,8 +406,59 @@ private:
         Areas sum;
         for (const Areas& areas : of_item_) sum.add(areas);
         for (const Areas& areas : shares) sum.add(areas);
-        constexpr double surely = 4;
-        return std::abs(sum.reached - options_.limit * sum.all) > surely * error;
+        return std::abs(sum.reached - options_.limit * sum.all) > kSurely * error;
+    }
+
+    /// Points dealt evenly over the surface, by area along the space-filling curve: what they find, where it
+    /// decides about the limit or is as accurate as is asked for. Not where the surface, piece by piece,
+    /// takes hardly more points.
+    [[nodiscard]] std::optional<Accessibility> poll(std::size_t points) {
+        std::vector<double> up_to;  // mm², of the pieces as they follow one another
+        up_to.reserve(work_.pieces.size());
+        double surface = 0;
+        for (const Piece& piece : work_.pieces) up_to.push_back(surface += area_of(piece.t));
+        if (kPointsASquare * surface < static_cast<double>(points) * spacing_ * spacing_) return std::nullopt;
+        std::vector<std::pair<Tally, ReachCounts>> found((points + kPointsAtOnce - 1) / kPointsAtOnce);
+        parallel_for(context_, points, kPointsAtOnce, [&](std::size_t begin, std::size_t end) {
+            auto& [tally, counts] = found[begin / kPointsAtOnce];
+            ReachSearcher searcher(question_);
+            for (std::size_t k = begin; k < end && !context_.cancelled(); ++k) {
+                const double at = (static_cast<double>(k) + 0.5) / static_cast<double>(points) * surface;
+                const auto here = std::upper_bound(up_to.begin(), std::prev(up_to.end()), at);
+                const Piece& piece = work_.pieces[static_cast<std::size_t>(here - up_to.begin())];
+                add_point(tally, searcher, question_, scattered(piece.t, k), work_.items[piece.item].normal);
+            }
+            counts = searcher.counts();
+        });
+        context_.throw_if_cancelled();
+        Tally all;
+        for (const auto& [tally, counts] : found) {
+            all.points += tally.points;
+            all.reached += tally.reached;
+            all.undercut += tally.undercut;
+            counts_.add(counts);
+        }
+        // Agresti and Coull: two more of either kind, so that even where all agree some doubt is left.
+        const double asked = all.points - all.undercut, share = (all.reached + 2) / (asked + 4),
+                     error = std::sqrt(share * (1 - share) / (asked + 4));
+        if (asked == 0) return std::nullopt;
+        const bool decided = std::abs(all.reached / asked - options_.limit) > kSurely * error;
+        if (!decided && error > options_.accuracy) return std::nullopt;
+        Accessibility sure;
+        const double each = surface / all.points;
+        sure.area = sure.uncertain = each * asked;
+        sure.reached = each * all.reached;
+        sure.undercut = work_.undercut + each * all.undercut;
+        sure.likely_error = error;
+        count(sure);
+        return sure;
+    }
+
+    void count(Accessibility& result) const {
+        result.points = counts_.points;
+        result.queries = counts_.queries;
+        result.rays = counts_.rays;
+        result.undecided = counts_.undecided;
     }
 
     [[nodiscard]] Accessibility result(std::size_t facets, double uncertain) const {
@@ -404,10 +474,7 @@ private:
             if (options_.shares && a.all > 0)
                 result.share[work_.items[i].facet] = static_cast<float>(std::min(1.0, a.reached / a.all));
         }
-        result.points = counts_.points;
-        result.queries = counts_.queries;
-        result.rays = counts_.rays;
-        result.undecided = counts_.undecided;
+        count(result);
         return result;
     }
 

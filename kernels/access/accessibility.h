@@ -31,8 +31,9 @@ struct AccessOptions {
     /// half of its area, up or down, and none knows of the others. What is left of them goes into
     /// `uncertain`.
     double accuracy = 0.002;
-    /// An AR that is asked about, over 0: pieces are halved no further where AR is over or under it by four
-    /// times its likely error.
+    /// An AR that is asked about, over 0: nothing is measured any finer where AR is over or under it by four
+    /// times its likely error. Unless `shares` are asked for, a large surface is then not taken piece by
+    /// piece: 512 points dealt evenly over it are tested, where those do not tell 2048, and then 8192.
     double limit = 0;
     double lowest_tip =
         -std::numeric_limits<double>::infinity();  ///< mm: no tip goes lower (base board, flask)
@@ -44,17 +45,18 @@ struct AccessOptions {
 struct Accessibility {
     double area = 0;  ///< to be machined in this layer: facing up or upright (within 1e-4 rad), and nothing
                       ///< of the layer above it
-    double reached = 0;   ///< of it
-    double undercut = 0;  ///< facing down, or under something that does
-    double uncertain =
-        0;  ///< of pieces on a border, of which `reached` and `undercut` hold their points' shares
+    double reached = 0;       ///< of it
+    double undercut = 0;      ///< facing down, or under something that does
+    double uncertain = 0;     ///< of pieces on a border, of which `reached` and `undercut` hold their points'
+                              ///< shares; all of `area` where points were dealt evenly (AccessOptions::limit)
+    double likely_error = 0;  ///< of ratio(): one standard deviation, where borders and points fall by chance
     std::vector<float> share;  ///< on request, per facet of the mesh: reached / area; −1 where nothing of it
                                ///< is to be machined in this layer
     std::uint64_t points = 0, queries = 0, rays = 0;  ///< tested, and asked of Embree
     std::uint64_t undecided = 0;  ///< points given up after 20000 places, counted as not reached
 
     /// AR; 1 where nothing is to be machined. Its error is at most uncertain/area, and likely some
-    /// `accuracy`, unless a spot smaller than the spacing is missed.
+    /// `likely_error`, unless a spot smaller than the spacing is missed.
     [[nodiscard]] double ratio() const { return area > 0 ? reached / area : 1; }
 };
 
