@@ -446,6 +446,41 @@ TEST(Feeds, PassesGoThereAndBackOrRoundAndRound) {
     }
 }
 
+// Straight down beside what is cleared: where a strip is met on the way, at the plunge's feed, else as fast
+// as planned; whether feeds are adapted or not.
+TEST(Feeds, WhatIsMetStraightDownIsPlungedInto) {
+    for (const bool adapt : {true, false}) {
+        Plan plan = plate();
+        plan.job.cutting.adapt_feed = adapt;
+        const Tool& flat = plan.job.tools[1];
+        const double r = flat.diameter / 2;
+        std::vector<Move> moves{at(-20, 40, 30, 0), at(-20, 40, 12, 0), at(60, 40, 12, 9000),
+                                at(60, 40, 30, 0)};
+        std::vector<std::pair<std::size_t, bool>> down;  // moves, and whether they meet something
+        for (const double beside : {0.0, 0.9, -0.9, r}) {
+            moves.push_back(at(30 + beside, 40 + beside, 19, 0));
+            down.emplace_back(moves.size(), beside != 0);
+            moves.push_back(at(30 + beside, 40 + beside, 12, 9000));
+            moves.push_back(at(30 + beside, 40 + beside, 30, 0));
+        }
+        plan.layers[0].operations = {line(plan, OperationKind::rough, 2, moves)};
+        std::vector<Diagnostic> diagnostics;
+        Context context;
+        (void)adapt_layer(context, plan.layers[0], plan, {}, diagnostics);
+        const std::vector<Move>& after = plan.layers[0].operations[0].moves;
+        std::size_t found = 0;
+        for (std::size_t k = 1; k < after.size(); ++k)
+            for (const auto& [before, meets] : down)
+                if (after[k].feed > 0 && after[k].z < after[k - 1].z && after[k].x == moves[before].x &&
+                    after[k].y == moves[before].y) {
+                    EXPECT_EQ(after[k].feed, meets ? static_cast<std::uint32_t>(flat.plunge_feed) : 9000U)
+                        << "at x " << to_mm(after[k].x) << (adapt ? ", adapted" : "");
+                    ++found;
+                }
+        EXPECT_EQ(found, down.size());
+    }
+}
+
 // Wood that hangs over: cut where it stands on something it needs nothing; far out, a web thinner than
 // section 9 asks for is reported.
 TEST(Feeds, WoodThatHangsOverTooFarIsReported) {

@@ -115,8 +115,8 @@ TEST(ForeseenFinish, TheWidestBallThatLeavesLittleIsBest) {
     EXPECT_DOUBLE_EQ(narrow.ranked().front().diameter, 0.125 * kInch);
     for (const Tool& tool : gentle.job.tools) {
         ASSERT_EQ(wide.minutes(tool.number).has_value(), tool.kind == ToolKind::ball);
-        if (tool.kind == ToolKind::ball)
-            EXPECT_LE(*wide.minutes(wide.ranked().front().number), *wide.minutes(tool.number));
+        if (tool.kind != ToolKind::ball) continue;
+        EXPECT_LE(*wide.minutes(wide.ranked().front().number), *wide.minutes(tool.number));
     }
     // Nothing to finish: whichever was preferred.
     OneLayer level([](double, double) { return 12.0; });

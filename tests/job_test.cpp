@@ -473,7 +473,12 @@ TEST(Job, TheBaseBoardIsCutByBalls) {
     EXPECT_EQ(board_cut_limit(job.machine, job.tools), 1.5);
     job.machine.base_board_cut = -1;
     job.tools[1].diameter = 60;
-    EXPECT_EQ(board_cut_limit(job.machine, job.tools), job.machine.base_board_thickness);
+    EXPECT_EQ(board_cut_limit(job.machine, job.tools), job.machine.base_board_thickness - 2)
+        << "something of it stays over the table";
+    job.machine.base_board_thickness = 1;
+    EXPECT_EQ(board_cut_limit(job.machine, job.tools), 0);
+    job.machine.base_board_cut = 1;
+    EXPECT_EQ(board_cut_limit(job.machine, job.tools), 1) << "whoever says so may cut through";
 }
 
 TEST(Job, ToolOfKind) {

@@ -552,7 +552,7 @@ TEST(KeepOuts, ABoltInTheWayIsRefused) {
     EXPECT_NE(error.message().find("T1"), std::string::npos) << error.what();
     // So high that the spindle does not get over it.
     error = refusal(job_with_bolt(150, 40, 400));
-    EXPECT_EQ(error.code(), "fit.travel");
+    EXPECT_EQ(error.code(), "machine.travel_z");
     // A clamp on a slab that is faced.
     Job job = job_with_bolt(10, 10, 12);
     job.machine.keep_outs[0].from = KeepOutBase::slab;

@@ -73,9 +73,9 @@ TEST(Planner, SaysByHowMuchAPartIsTooLarge) {
               std::string::npos);
     Job low;
     low.machine.travel_z = 15;
-    EXPECT_NE(
-        refusal(box(context, 100, 100, 30), low, "fit.travel").find("leaves the machine's travel in z by"),
-        std::string::npos);
+    EXPECT_NE(refusal(box(context, 100, 100, 30), low, "machine.travel_z").find("tools' lengths included: "),
+              std::string::npos)
+        << "a program that is too high by itself is told with what all of them need";
     // Each program by itself stays within the travel; from the first to the last layer they do not.
     Job fixed;
     fixed.machine.table = BuildTable::fixed;

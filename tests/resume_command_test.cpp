@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <string>
 
 #include "engine/simulate/planned_build.h"
@@ -293,6 +294,13 @@ TEST_F(ResumeCommand, SaysWhereTheBuildStandsAndWritesNothingUnasked) {
     said = resume();
     EXPECT_NE(said.out.find("layer 2 on top"), std::string::npos) << said.out;
     EXPECT_NE(said.out.find("the base board's at z = -28.13 mm"), std::string::npos) << said.out;
+    // Where to touch off, edges before the top.
+    const std::string next = resume({"--after", std::to_string(step("touch_off", 2) - 1)}).out;
+    EXPECT_TRUE(std::regex_search(
+        next, std::regex("touch_off: the slab's edges at x = -125\\.4 mm, y = -[0-9.]+ mm, its top at z = "
+                         "-?[0-9.]+ mm")))
+        << next;
+    ASSERT_EQ(resume({"--after", std::to_string(milled)}).exit, 0);
     const json told = json::parse(resume({"--json"}).out);
     EXPECT_EQ(told["schema"], "slabwright.resume/1");
     EXPECT_EQ(told["after"], milled);

@@ -19,6 +19,7 @@
 #include <string>
 #include <string_view>
 
+#include "engine/paths/operations/dowel_holes.h"
 #include "io/front_door.h"
 #include "io/orient.h"
 #include "io/prepare.h"
@@ -80,7 +81,13 @@ Job job_of(const Options& options) {
     word("layers.strategy", options.strategy);
     word("layers.sides", options.sides);
     const bool two_sided = !options.sides.empty() && options.sides != "one";
-    put("dowels.per_joint", two_sided && job.dowels.per_joint == 0 ? "2" : "");
+    if (two_sided && job.dowels.per_joint == 0) {
+        put("dowels.per_joint", "2");
+        // Nobody has chosen them: such as the library makes holes for.
+        if (job.dowels.diameter == JointDowels{}.diameter)
+            if (const auto size = dowel_size(job, job.dowels.depth))
+                put("dowels.diameter", fmt::format("{:.1f}", *size));
+    }
     word("layers.finder", options.finder);
     put("tolerances.weld", options.weld_given ? fmt::format("{}", options.weld) : "");
     keys += prepare_keys(options.prepare);

@@ -33,11 +33,13 @@ std::string summary(const Plan& plan, const std::string& out) {
     int programs = 0;
     for (const Layer& layer : plan.layers)
         for (std::size_t o = 0; o < layer.operations.size(); o = file_end(layer, o)) ++programs;
-    std::string text =
-        fmt::format("{}: {} {}, {} {}, {} in all (cutting {}, bonding {}, tool changes {})\n", out, t.layers,
-                    t.layers == 1 ? "layer" : "layers", programs, programs == 1 ? "program" : "programs",
-                    duration(t.build_minutes), duration(t.cutting_minutes), duration(t.bonding_minutes),
-                    duration(t.tool_change_minutes));
+    std::string text = fmt::format(
+        "{}: {} {}, {} {}, {} in all (cutting {}, bonding {}, tool changes {}{})\n", out, t.layers,
+        t.layers == 1 ? "layer" : "layers", programs, programs == 1 ? "program" : "programs",
+        duration(t.build_minutes), duration(t.cutting_minutes), duration(t.bonding_minutes),
+        duration(t.tool_change_minutes),
+        t.underside_minutes > 0 ? ", slabs milled from below first " + duration(t.underside_minutes)
+                                : std::string());
     if (t.magazine_swaps > 0)
         text += fmt::format("swaps   {} of a tool in the magazine for another, {} of the time\n",
                             t.magazine_swaps, duration(t.magazine_minutes));

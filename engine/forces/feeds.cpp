@@ -134,6 +134,7 @@ public:
         Divided divided;
         before = slab;
         see(slab);
+        slow_plunges(slab);
         for (int round = 0;; ++round) {
             std::size_t asked = 0;
             for (SeenStretch& s : memory_.seen) {
@@ -253,6 +254,12 @@ private:
     void see(StandingSlab& slab, std::span<const MoveRange> parts = {}) {
         run_through(context_, slab, op_, tool_, layer_, limits_, job_.bonding.edge_setback,
                     parts.empty() ? memory_.seen : memory_.anew, parts);
+    }
+    // What was thought to be air, beside the cutter's middle, may have a strip of wood in it.
+    void slow_plunges(const StandingSlab& slab) {
+        const auto slow =
+            static_cast<std::uint32_t>(std::max(1.0, std::min(tool_.plunge_feed, job_.machine.max_feed)));
+        for (const std::uint32_t k : slab.plunges()) op_.moves[k].feed = std::min(op_.moves[k].feed, slow);
     }
 
     // @param before what stood before the operation

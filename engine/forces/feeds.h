@@ -82,6 +82,7 @@ struct WoodLimits {
 ///   * Where the job adapts stepdowns, what holds at no feed is cut in several passes (split_cuts.h); for
 ///   wood only where the lowest of them then holds, and where none of the operation's cuts
 ///     breaks it all the same.
+/// Moves straight down that meet more than a cubic millimetre of wood go no faster than Tool::plunge_feed.
 /// Drills are left alone.
 /// @param known of this very plan, or null
 /// @param diagnostics gets, per operation, "stepdown.lowered" (how many, how long, the deepest),

@@ -477,7 +477,8 @@ std::vector<Diagnostic> LayerRules::diagnose(const std::vector<double>& tops) co
             found.push_back({Severity::warning,
                              "layers.thin",
                              "the layer from " + words_mm(mm_of(bottom)) + " to " + words_mm(tops[i]) +
-                                 " mm is thinner than the minimum of " + words_mm(request_.min_layer) + " mm",
+                                 " mm is thinner than the minimum of " + words_mm(request_.min_layer) +
+                                 " mm: give other slabs.thicknesses, or a smaller layers.min_layer",
                              {}});
         diagnose_slabs(bottom, z, found);
         for (const Level& l : type2_)

@@ -147,7 +147,7 @@ void report_loose(const LayerCut& cut, LayerResult& result) {
         result.diagnostics.push_back(
             {piece.area_mm2 * piece.thickness_mm < kLight ? Severity::note : Severity::warning, "waste.loose",
              fmt::format("layer {}: a piece of waste of {:.0f} mm², up to {:.1f} mm "
-                         "thick, comes loose while the {} are cut",
+                         "thick, comes loose in \"{}\"",
                          layer.index, piece.area_mm2, piece.thickness_mm,
                          result.operations[piece.operation].purpose),
              std::array<double, 3>{piece.x, piece.y, layer.z_bottom}});

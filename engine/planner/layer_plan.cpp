@@ -243,8 +243,15 @@ private:
                 try_set(s, none, PaceAhead{}.times);
             } else {
                 set.record.reason =
-                    fmt::format("given up: clearing takes it {:.1f} min or more, set {} {:.1f} min",
-                                set.record.minutes, leader + 1, cleared[leader]);
+                    cleared[s] > 0
+                        ? fmt::format(
+                              "given up: clearing, and what then still stands, take it {:.1f} min, "
+                              "set {} {:.1f} min",
+                              cleared[s], leader + 1, cleared[leader])
+                        : fmt::format(
+                              "given up: clearing takes it {:.1f} min or more, set {} {:.1f} min "
+                              "with what then still stands",
+                              set.record.minutes, leader + 1, cleared[leader]);
             }
         }
     }
@@ -336,6 +343,11 @@ private:
             else if (record.reason.empty())
                 record.reason = fmt::format("takes {:.1f} min longer", record.minutes - least);
         }
+        const std::vector<int>& cut_with = selection_->sets[chosen_].tools;
+        for (ToolCandidate& candidate : selection_->candidates)
+            if (candidate.chosen &&
+                std::find(cut_with.begin(), cut_with.end(), candidate.tool) == cut_with.end())
+                candidate.reason += "; not in the set that cuts the layer, which takes less time";
     }
 
     Context& context_;

@@ -64,7 +64,7 @@ void check_travel(const Plan& plan) {
                  cy = 0.5 * (plan.stock_min[1] + plan.stock_max[1]);
     for (const Layer& layer : plan.layers)
         for (const Operation& op : layer.operations) {
-            double over_x = 0, over_y = 0, low = kUnbounded, high = -kUnbounded;
+            double over_x = 0, over_y = 0;
             auto reach = [&](double x, double y) {
                 over_x = std::max(over_x, std::abs(x - cx) - machine.travel_x / 2);
                 over_y = std::max(over_y, std::abs(y - cy) - machine.travel_y / 2);
@@ -77,11 +77,8 @@ void check_travel(const Plan& plan) {
                     reach(box[0], box[1]);
                     reach(box[2], box[3]);
                 }
-                low = std::min(low, to_mm(m.z));
-                high = std::max(high, to_mm(m.z));
             }
-            const double over_z = high - low - machine.travel_z;
-            for (const auto& [over, axis] : {std::pair{over_x, "x"}, {over_y, "y"}, {over_z, "z"}})
+            for (const auto& [over, axis] : {std::pair{over_x, "x"}, {over_y, "y"}})
                 if (over > 1e-4)
                     throw refusal(
                         "fit.travel",

@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kFinestCell = 0.2;   // mm
 constexpr double kLeastTaken = 1e-4;  // mm: less is rounding, of paths and of heights
+constexpr double kPlunge = 1;         // mm³ that make a move straight down a plunge
 
 // What a stretch has met so far.
 struct Met {
@@ -149,6 +150,7 @@ StandingSlab::StandingSlab(std::array<double, 2> stock_min, std::array<double, 2
 
 void StandingSlab::run(const Operation& operation, const Tool& tool,
                        const std::function<void(const CutStretch&)>& stretch) {
+    plunges_.clear();
     run(operation, tool, {}, true, stretch);
 }
 
@@ -226,8 +228,7 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<c
             }
         }
         if (b.feed == 0) {
-            finish();
-            been = false;
+            finish(), been = false;
             continue;
         }
         const std::array<double, 3> from{to_mm(a.x), to_mm(a.y), to_mm(a.z)},
@@ -237,6 +238,7 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<c
         if (a.x == b.x && a.y == b.y) {
             finish();
             step(move, from, to, 1);
+            if (all && by_part.front().volume > kPlunge) plunges_.push_back(move);
             continue;
         }
         if (b.is_arc()) {

@@ -45,6 +45,9 @@ public:
     void run(const Operation& operation, const Tool& tool,
              const std::function<void(const CutStretch&)>& stretch);
 
+    /// Of the last run(): moves straight down that took away more than a cubic millimetre.
+    [[nodiscard]] std::span<const std::uint32_t> plunges() const { return plunges_; }
+
     /// The same of some moves only, and of what must be gone before them: of all moves before the last of
     /// `parts`, those are cut that come near any of these, and the stretches of the parts are told. Where
     /// none of run()'s stretches is half within a part these are run()'s very stretches; what stands
@@ -68,6 +71,7 @@ private:
     CellGrid grid_;
     double bottom_ = 0;
     std::vector<float> height_;  // over bottom_
+    std::vector<std::uint32_t> plunges_;
 };
 
 }  // namespace slabwright

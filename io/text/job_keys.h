@@ -203,7 +203,7 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
                "the control that the programs are for: linuxcnc, fanuc, haas, grbl, mach, iso, siemens or "
                "heidenhain; or a file, a post of your own");
     visit.word("units", machine.units, kUnitWords,
-               "of the programs: mm or inch; this file and plan.json stay in mm");
+               "of the programs: mm or in; this file and plan.json stay in mm");
     visit.word("programs", machine.programs, kProgramWords,
                "what one program holds: an operation, a tool (all that it does in a layer between two "
                "changes), or a layer, which changes tools by itself");
@@ -220,7 +220,8 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
     visit.key("base_board_thickness", machine.base_board_thickness,
               "mm, the sacrificial board under the first layer");
     visit.key("base_board_cut", machine.base_board_cut,
-              "mm that may be cut into it; negative: as deep as the finish tool overruns");
+              "mm that may be cut into it; negative: as deep as the finish tool overruns, but for 2 mm of "
+              "the board");
 }
 
 /// Walks the keys of the probing programs.
@@ -490,11 +491,13 @@ void visit_plain_job_keys(JobLike& job, Visit& visit) {
     visit.table(
         "selection",
         "which tools of the library cut a layer (LUO 5.5); nothing to select with one flat and one ball");
-    visit.word("mode", job.selection.mode, kSelectionWords,
-               "select: layer by layer; fixed: 1/2 in flat and 1/4 in ball, or the first of each");
+    visit.word(
+        "mode", job.selection.mode, kSelectionWords,
+        "select: layer by layer; fixed: 1/2 in flat and 1/4 in ball, or the first of each, and smaller "
+        "ones for what these leave");
     visit.word("accessibility", job.selection.accessibility, kAccessWords,
-               "sections: by the length of sections that is touched; exact: by area in 3D, slow; printed: as "
-               "LUO 5.5.1");
+               "exact: by area in 3D, with shank and holder; sections: by the length of sections that is "
+               "touched; printed: as LUO 5.5.1");
     visit.key("threshold", job.selection.threshold, "share of a layer that its finish tool must reach (AR)");
     visit.key("overlap_weight", job.selection.overlap_weight,
               "W, weight of walls too near each other, of the printed AR");

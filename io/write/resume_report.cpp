@@ -17,6 +17,20 @@ constexpr int kLength = 4;          // decimals
 
 std::string mm(double value) { return rounded_text(value, 3); }
 
+/// Where a touch-off must find the slab, whatever the order of its numbers in the file; "" of other steps.
+std::string touched_off(const SequenceStep& step) {
+    const auto number = [&](std::string_view key) {
+        const auto found = std::find_if(step.numbers.begin(), step.numbers.end(),
+                                        [&](const auto& pair) { return pair.first == key; });
+        return found == step.numbers.end() ? std::optional<double>{} : std::optional(found->second);
+    };
+    const auto left = number("slab_left_mm"), front = number("slab_front_mm"), top = number("slab_top_mm");
+    std::string text;
+    if (left && front) text = ": the slab's edges at x = " + mm(*left) + " mm, y = " + mm(*front) + " mm";
+    if (top) text += (text.empty() ? ": the slab's top at z = " : ", its top at z = ") + mm(*top) + " mm";
+    return text;
+}
+
 /// "step 12, layer 2: mill nc/L002_02_rough_T2.ngc"
 std::string told(const SequenceStep& step) {
     std::string text = fmt::format("step {}, layer {}: {}", step.id, step.layer, step.action);
@@ -31,13 +45,11 @@ std::string told(const SequenceStep& step) {
         if (step.action == "set_dowels" && key == "diameter_mm") text += fmt::format(" {:g}", value);
         if (step.action == "set_dowels" && key == "length_mm") text += fmt::format(" x {:g} mm", value);
         if (key == "table_height_mm") text += " to " + mm(value) + " mm";
-        if (key == "slab_left_mm") text += " the slab's edges at x = " + mm(value) + " mm";
-        if (key == "slab_front_mm") text += ", y = " + mm(value) + " mm, its top";
-        if (key == "slab_top_mm") text += " at z = " + mm(value) + " mm";
         if (key == "force_n") text += fmt::format(" with {:.0f} N", value);
     }
     for (const auto& [key, value] : step.words)
         if (key == "length") text += ", " + value + " its tip";
+    text += touched_off(step);
     if (step.action == "clear") text += " the handler and the feed chamber by hand, wipe wet glue off";
     if (step.seconds >= 1) text += fmt::format(", {:.0f} s", step.seconds);
     return text;

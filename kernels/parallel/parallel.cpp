@@ -109,7 +109,7 @@ MemoryCharge::MemoryCharge(Context& context, std::uint64_t bytes, std::string_vi
         context_.charged_.fetch_sub(bytes);
         auto mib = [](std::uint64_t b) { return std::to_string((b + (1u << 20) - 1) >> 20) + " MiB"; };
         throw Error(ErrorKind::no_plan, "memory.limit",
-                    std::string(what) + " needs " + mib(bytes) + " beside " + mib(before) +
+                    "no room for " + std::string(what) + ": " + mib(bytes) + " beside " + mib(before) +
                         " in use, over the limit of " + mib(context_.memory_limit_),
                     {}, "raise --memory or plan with fewer facets");
     }

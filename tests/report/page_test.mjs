@@ -65,7 +65,7 @@ const clock = minutes => { const m = Math.round(minutes); return m < 60 ? `${m} 
     check.that('summary: glue', text.includes(`${glue.toFixed(1)} cm²`), glue);
     const magazine = await page.locator('#magazine tbody tr td:first-child').allTextContents();
     const used = new Set(plan.layers.flatMap(layer => layer.operations.map(o => o.tool)));
-    check.equal('summary: tools in the order of the magazine', magazine, plan.tools.map(t => t.number).filter(n => used.has(n)).sort((a, b) => a - b).map(n => `T${n}`));
+    check.equal('summary: tools in the order of their numbers', magazine, plan.tools.map(t => t.number).filter(n => used.has(n)).sort((a, b) => a - b).map(n => `T${n}`));
     // The parts of the build time, from the page's own plot data, are the whole.
     const steps = data.steps.reduce((sum, step) => sum + step[2], 0) / 60;
     check.that('data: steps are the build time', Math.abs(steps - plan.totals.build_minutes) < 0.02 * plan.totals.build_minutes, `${steps} ${plan.totals.build_minutes}`);

@@ -37,13 +37,12 @@ const Tool* maker_of(const Job& job, double hole, double depth) {
     return widest;
 }
 
-/// Which dowels of those that shops keep (DIN 68150-1) the library has a tool for, in words; "" for none.
+/// Which dowels the library has a tool for, in words; "" for none.
 std::string dowels_that_can_be(const Job& job, double depth) {
-    for (const double diameter : {8, 10, 6, 12, 14, 16, 18, 20, 5})
-        if (const Tool* const tool = maker_of(job, diameter, depth))
-            return fmt::format("; or take dowels.diameter = {}, whose holes T{} makes", diameter,
-                               tool->number);
-    return "";
+    const std::optional<double> size = dowel_size(job, depth);
+    return size ? fmt::format("; or take dowels.diameter = {}, whose holes T{} makes", *size,
+                              maker_of(job, *size, depth)->number)
+                : "";
 }
 
 }  // namespace
@@ -60,6 +59,12 @@ const Tool& dowel_tool(const Job& job, double depth) {
                 fmt::format("add a drill of {0:g} mm with flutes and stick-out for that depth, or a flat end "
                             "mill between {1:g} and {0:g} mm, narrower by more than its core_diameter{2}",
                             hole, hole / 2, dowels_that_can_be(job, depth)));
+}
+
+std::optional<double> dowel_size(const Job& job, double depth) {
+    for (const double diameter : {job.dowels.diameter, 8.0, 10.0, 6.0, 12.0, 14.0, 16.0, 18.0, 20.0, 5.0})
+        if (maker_of(job, diameter, depth) != nullptr) return diameter;
+    return std::nullopt;
 }
 
 Operation dowel_holes(const Job& job, const Layer& layer, const Tool& tool) {

@@ -1,6 +1,8 @@
 // The holes for dowels in a layer's top (engine/schedule/dowels): drilled, or bored by a flat end mill.
 #pragma once
 
+#include <optional>
+
 #include "engine/plan.h"
 
 namespace slabwright {
@@ -16,6 +18,10 @@ inline constexpr double kSameDowel = 0.05;
 /// narrower by more than its core. Flutes and stick-out must reach, less cutting.holder_clearance.
 /// @throws Error(usage, "dowel.tool") where the library has none
 [[nodiscard]] const Tool& dowel_tool(const Job& job, double depth);
+
+/// Of the job's dowels.diameter and those that shops keep (DIN 68150-1), 8 and 10 mm first, the first whose
+/// holes of this depth (mm) the library makes; none where it makes none.
+[[nodiscard]] std::optional<double> dowel_size(const Job& job, double depth);
 
 /// The program for a layer's dowels; no moves where it has none.
 [[nodiscard]] Operation dowel_holes(const Job& job, const Layer& layer, const Tool& tool);

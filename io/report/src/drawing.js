@@ -3,7 +3,7 @@
 import {figure, make} from './dom.js';
 import {blankOf, data, flaskRings, plan} from './report.js';
 import {filledBoxes} from './wood.js';
-import {shownHeights, zeroHeight} from './zero.js';
+import {onControl, shownHeights, zeroHeight} from './zero.js';
 
 const ink = '#1f252b', dim = '#525c66', red = '#b0141f', wood = '#f1e6d3', cutWood = '#d9bd8a', glueInk = '#8f6200', purple = '#5b3a8e';
 
@@ -135,7 +135,7 @@ export function sideView(l, paper) {
     const y = z => raw - z + 6 * u;
     const mark = (z, shown, name, color, up) => [
         make('path', {d: `M0 ${y(z)}H${w + 3 * u}`, stroke: color, 'stroke-width': 0.45 * u, fill: 'none'}),
-        label(w + 4 * u, y(z) + (up ? -0.8 : 3) * u, `z ${shown < 0 ? '−' : ''}${figure(Math.abs(shown), 2)} ${name}`, 3.3 * u, {fill: color, 'font-weight': 600})];
+        label(w + 4 * u, y(z) + (up ? -0.8 : 3) * u, `z ${onControl(shown)} ${name}`, 3.3 * u, {fill: color, 'font-weight': 600})];
     const below = plan.layers.slice(0, l).filter(other => other.z_top > low);
     const zero = zeroHeight(l);
     return make('svg', {class: 'side-view', viewBox: `${-2 * u} 0 ${paper[0] * u} ${paper[1] * u}`, role: 'img',

@@ -76,7 +76,7 @@ export function toolOf(number) {
     return plan.tools.find(tool => tool.number === number);
 }
 
-// Which tools the plan uses, in the order of the magazine.
+// Which tools the plan uses, in the order of their numbers.
 export function toolUse() {
     return plan.tools.map(tool => {
         const uses = operations.filter(operation => operation.tool === tool.number);

@@ -6,7 +6,7 @@ import {dowelsIn, keepOutsIn, planView, sideView, stackView, supportsIn} from '.
 import {blankOf, blankSize, data, fileOf, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
 import {undersideOf, undersideSheets} from './undersides.js';
 import {filledVolume} from './wood.js';
-import {probed, tableHeight, zeroHeight, zeroOf} from './zero.js';
+import {inInches, onControl, probed, tableHeight, zeroHeight, zeroIsSet, zeroOf} from './zero.js';
 
 const cubic = mm3 => mm3 < 1000 ? `${figure(mm3, 0)} mm³` : `${figure(mm3 / 1000, 1)} cm³`;
 
@@ -68,7 +68,7 @@ function toolRows(uses, key) {
         tick(`${key}:T${number}`, `T${number} loaded and measured`, true), make('strong', {}, `T${number}`), tool.name, figure(tool.diameter, 3) + formOf(tool), make('strong', {}, figure(tool.holder.stickout, 1)),
         figure(tool.flute_length, 1), span(list.map(o => o.spindle_rpm), ''), feedsOf(list)]);
 }
-const toolHead = ['✓', 'Place', 'Tool', 'Ø mm', 'Stick-out mm', 'Flutes mm', 'rpm', 'Feed mm/min'];
+const toolHead = ['✓', 'Number', 'Tool', 'Ø mm', 'Stick-out mm', 'Flutes mm', 'rpm', 'Feed mm/min'];
 
 // Which control the programs are for, where it is not LinuxCNC in millimetres, and what they leave to its settings.
 function control() {
@@ -90,7 +90,8 @@ function foundIn(l) {
 function simulated(l) {
     const found = foundIn(l);
     if (!found) return ['not simulated: run “slabwright verify” before cutting'];
-    const lines = [`deepest gouge ${figure(found.gouge.mm, 4)} mm; left over where a tool reaches at most ${figure(found.missed?.mm > 0 ? found.missed.mm : verify.limits.left_over_mm, 3)} mm`];
+    const left = found.missed?.mm > 0 ? `at most ${figure(found.missed.mm, 3)} mm` : `no more than the ${figure(verify.limits.left_over_mm, 3)} mm allowed`;
+    const lines = [`deepest gouge ${figure(found.gouge.mm, 4)} mm; left over where a tool reaches ${left}`];
     if (found.unreachable_mm2 >= 0.5) lines.push(`out of every tool’s reach ${figure(found.unreachable_mm2, 1)} mm², up to ${figure(found.unreachable?.mm, 2)} mm`);
     return lines;
 }
@@ -128,6 +129,12 @@ function dowelFacts(l) {
     return lines;
 }
 
+// How deep the base board is cut, for whoever screws it down; '' where it is not.
+function boardCut() {
+    const deep = verify?.totals?.board_cut_mm ?? 0;
+    return deep > 0.005 ? `, no screw or pin less than ${figure(deep, 2)} mm under its top: programs cut so deep` : '';
+}
+
 function sheet(l, minutes) {
     const layer = plan.layers[l], programs = operations.filter(operation => operation.layer === l), zero = zeroOf(l), filled = filledVolume(l);
     const off = layer.z_bottom + layer.slab_thickness - layer.z_top, files = [...new Set(programs.map(o => fileOf(o).replace(/^nc\//, '')))], first = files[0], final = files[files.length - 1];
@@ -142,7 +149,7 @@ function sheet(l, minutes) {
         warningBox(warnings, 5),
         make('div', {class: 'drawings'}, planView(l, [132, 92]), sideView(l, [58, 92])),
         make('p', {class: 'key'}, make('i', {class: 'glue'}), ' glue ', make('i', {class: 'solid'}), ' pattern at the bottom ', make('i', {class: 'dash'}), ' at the top ',
-            filled >= 1 ? [make('i', {class: 'air'}), ' stays filled '] : null, supportsIn(l).length ? [make('i', {class: 'support'}), ' support, stays till the end '] : null, keepOutsIn(l).length ? [make('i', {class: 'keep-out'}), ' no tool enters '] : null, dowelsIn(l).length ? [make('i', {class: 'dowel'}), ' dowel under the slab, dashed: hole in its top '] : null, make('i', {class: 'zero'}), ' zero. Measures in mm; z as the control shows it.'),
+            filled >= 1 ? [make('i', {class: 'air'}), ' stays filled '] : null, supportsIn(l).length ? [make('i', {class: 'support'}), ' support, stays till the end '] : null, keepOutsIn(l).length ? [make('i', {class: 'keep-out'}), ' no tool enters '] : null, dowelsIn(l).length ? [make('i', {class: 'dowel'}), ' dowel under the slab, dashed: hole in its top '] : null, make('i', {class: 'zero'}), inInches ? ' zero. Measures in mm, but what the control shows in inches.' : ' zero. Measures in mm; z as the control shows it.'),
         make('div', {class: 'facts'},
             fact('Zero', make('p', {}, zero.place), make('p', {}, make('strong', {}, 'XY: '), zero.xy, zero.after ? `; ${zero.after}` : null), make('p', {}, make('strong', {}, 'Z: '), zero.z), make('p', {}, make('strong', {}, 'Table: '), tableHeight(l))),
             fact('Slab', make('p', {}, make('strong', {}, `${blankSize(l)} × ${figure(layer.slab_thickness, 2)} mm`), ` ${plan.job.material.name}${laid}`),
@@ -158,16 +165,16 @@ function sheet(l, minutes) {
                 tick(`L${l}:${o.name}`, `${o.name} done`, true), make('code', {}, o.name), `${words(o.kind)}: ${o.purpose}`, make('strong', {}, `T${o.tool}`), figure(o.spindle_rpm, 0), feedsOf([o]), duration(o.minutes)]), [4, 5, 6]))),
         make('h4', {}, 'Checks'),
         make('div', {class: 'checks'}, [
-            l === 0 ? `base board ${figure(plan.job.machine.base_board_thickness, 1)} mm mounted and level` : `layer ${plan.layers[l - 1].index} faced, free of dust where the glue goes`,
+            l === 0 ? `base board ${figure(plan.job.machine.base_board_thickness, 1)} mm mounted and level${boardCut()}` : `layer ${plan.layers[l - 1].index} faced, free of dust where the glue goes`,
             `slab at least ${figure(layer.slab_thickness, 2)} mm thick all over, no warp`,
             ...keepOutsIn(l).filter(k => k.slab || l === 0).map(k => `stands where it is drawn, no higher: ${k.says}`),
             ...(undersideOf(l) ? ['slab milled from below as its own sheet says, and turned over from left to right'] : []),
             ...(dowelsIn(l).some(d => d.under) ? [undersideOf(l) ? 'dowels set and dry-fitted' : 'holes in the slab’s underside drilled as dowels.csv says, dowels set and dry-fitted'] : []),
             ...(glued ? [`glue on, pressed ${figure(plan.job.bonding.press_time_s, 0)} s`] : []),
-            probed(l) ? 'XY touched off as above, Z probed by program' : 'XY and Z touched off as above',
+            zeroIsSet(l),
             ...((plan.post ? plan.post.base : plan.job.machine.post) === 'grbl' && !probed(l) ? ['at each change of tool: the new tip touched off where the last one was'] : []),
             'dust extraction on',
-            `after facing: top measured at z ${figure(layer.z_top - zeroHeight(l), 2)}`,
+            `after facing: top measured at z ${onControl(layer.z_top - zeroHeight(l))}`,
         ].map((text, i) => tick(`L${l}:check${i}`, text))),
         make('p', {class: 'proof'}, make('strong', {}, 'Simulated: '), simulated(l).join('; ')));
 }
@@ -225,7 +232,7 @@ function cover(minutes) {
                 figure(layer.glue_area_mm2 / 100, 1), figure(layer.press_force_n, 0), String(layer.operations.length), perLayer[l] ? String(perLayer[l]) : '–', shown[l]]),
             ['', make('strong', {}, 'All'), '', '', '', figure(t.glue_mm2 / 100, 1), '', String(operations.length), '', make('strong', {}, duration(plan.totals.build_minutes))]], [2, 3, 4, 5, 6, 7, 8, 9]),
         make('h4', {}, 'Every layer goes'),
-        make('ol', {class: 'steps'}, [glueHead(0) ? 'Clean the joint; the machine glues, lays and presses the slab.' : 'Clean the joint, spread the glue, lay the slab, press.', 'Set the table, touch off as the layer’s sheet says.', 'Run its programs in the order of their names; the first faces the slab.', 'Measure the faced top, tick the sheet, go on to the next.', ...(plan.supports?.length ? [`When the last is done: saw off ${plural(plan.supports.length, 'support')}, at ${plan.supports.map(s => `x ${figure(s.x, 0)} y ${figure(s.y, 0)}`).slice(0, 6).join(', ')}${plan.supports.length > 6 ? ' …' : ''}.`] : [])].map(s => make('li', {}, s))));
+        make('ol', {class: 'steps'}, [glueHead(0) ? 'Clean the joint; the machine glues, lays and presses the slab.' : 'Clean the joint, spread the glue, lay the slab, press.', plan.job.machine.table === 'fixed' ? 'Set the zero as the layer’s sheet says.' : 'Set the table, touch off as the layer’s sheet says.', 'Run its programs in the order of their names; the first faces the slab.', 'Measure the faced top, tick the sheet, go on to the next.', ...(plan.supports?.length ? [`When the last is done: saw off ${plural(plan.supports.length, 'support')}, at ${plan.supports.map(s => `x ${figure(s.x, 0)} y ${figure(s.y, 0)}`).slice(0, 6).join(', ')}${plan.supports.length > 6 ? ' …' : ''}.`] : [])].map(s => make('li', {}, s))));
 }
 
 export function buildSheets(section) {

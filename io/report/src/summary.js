@@ -81,14 +81,14 @@ function adviceCard(show) {
 }
 
 function toolTable() {
-    const head = ['Place', 'Tool', 'Kind', 'Diameter', 'Flutes', 'Flute length', 'Stick-out', 'Spindle', 'Programs', 'Time'];
+    const head = ['Number', 'Tool', 'Kind', 'Diameter', 'Flutes', 'Flute length', 'Stick-out', 'Spindle', 'Programs', 'Time'];
     const numeric = new Set([3, 4, 5, 6, 7, 8, 9]);
     const rows = toolUse().filter(({uses}) => uses.length > 0).map(({tool, uses, minutes}) => [
         `T${tool.number}`, tool.name, cutterOf(tool), `${figure(tool.diameter, 3)} mm`, tool.flutes, `${figure(tool.flute_length, 1)} mm`,
         `${figure(tool.holder.stickout, 1)} mm`, `${figure(Math.max(...uses.map(u => u.spindle_rpm)), 0)} rpm`, plural(uses.length, 'program'), duration(minutes),
     ]);
     return make('div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'Tools to load'}, make('table', {id: 'magazine'},
-        make('caption', {}, 'Tools to load, in the order of the magazine'),
+        make('caption', {}, 'Tools to load'),
         make('thead', {}, make('tr', {}, head.map((h, i) => make('th', {scope: 'col', class: numeric.has(i) ? 'n' : null}, h)))),
         make('tbody', {}, rows.map(row => make('tr', {}, row.map((cell, i) => make('td', {class: numeric.has(i) ? 'n' : null}, String(cell))))))));
 }

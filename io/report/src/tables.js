@@ -2,7 +2,7 @@
 
 import {cutterOf, duration, figure, make, plural, words} from './dom.js';
 import {drawPlaces, drawSums} from './draw.js';
-import {data, layerMinutes, operationName, operations, phases, plan, remarks, toolUse} from './report.js';
+import {data, layerMinutes, operationName, operations, phases, plan, remarks, toolUse, verify} from './report.js';
 
 // columns: {name, of: row => value, text: row => shown, numeric}
 function sortable(id, title, columns, rows, place, show) {
@@ -90,14 +90,17 @@ function bands(operation) {
 function cavityTable(show) {
     const {cavities} = data;
     if (!cavities?.places) return [];
+    // Where the proof finds nothing out of reach there is nothing to do, whatever tool the plan has taken for it.
+    const made = (verify?.totals?.unreachable_mm2 ?? 1) < 0.5;
+    const advice = r => made ? 'nothing: the proof finds it made' : r.advice;
     const title = `Narrow cavities (${plural(cavities.places, 'place')} up to ${figure(cavities.limits.width, 1)} mm wide)`;
     return [sortable('cavities', title, [
         number('Width, mm', r => r.width, 3), number('Widest, mm', r => r.widest, 3), number('Depth, mm', r => r.depth, 2), number('Depth to width', r => r.ratio, 1),
         number('Length, mm', r => r.length, 1), number('Area, mm²', r => r.area, 1), text('Layers', r => r.layers[0].layer, r => r.layers.map(l => l.layer).join(', ')),
         number('Stick-out needed, mm', r => r.stickout, 1), text('Tool', r => r.tool?.number ?? 0, r => r.tool ? `T${r.tool.number}` : 'none'),
-        number('It leaves, mm²', r => r.tool?.left, 1), text('Missing', r => r.missing?.name ?? ''), text('What to do', r => r.advice),
+        number('It leaves, mm²', r => r.tool?.left, 1), text('Missing', r => made ? '' : r.missing?.name ?? ''), text('What to do', advice),
         number('x', r => r.where[0]), number('y', r => r.where[1]), number('z', r => r.where[2]),
-    ], cavities.slenderest, r => ({where: r.where, text: r.advice}), show)];
+    ], cavities.slenderest, r => ({where: r.where, text: advice(r)}), show)];
 }
 
 export function buildTables(section, show) {

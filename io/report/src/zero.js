@@ -41,7 +41,17 @@ function woodAfter(l) {
     return heights[j * nx + i] > 0;
 }
 
-const millimetres = value => `${value < 0 ? '−' : ''}${figure(Math.abs(value), 2)}`;
+const sign = value => value < 0 ? '−' : '';
+const millimetres = value => sign(value) + figure(Math.abs(value), 2);
+
+// Whether the control shows inches.
+export const inInches = plan.job.machine.units === 'in';
+// A coordinate or a height as the control shows it; inches have their unit beside them, since all else on the sheets is mm.
+export const onControl = value => inInches ? `${sign(value)}${figure(Math.abs(value) / 25.4, 4)} in` : millimetres(value);
+const shown = value => inInches ? `${onControl(value)} (${millimetres(value)} mm)` : onControl(value);
+
+// Whether z 0 of layer l is where it was in layer 1, on the machine as well: it is left alone then.
+const stands = l => l > 0 && plan.job.machine.table === 'fixed' && plan.frame !== 'layer-top';
 
 // Which programs find z 0 in layer l, and what they touch; '' where the operator does.
 export function probed(l) {
@@ -58,19 +68,23 @@ export function zeroOf(l) {
     const off = outside(l);
     const own = places[plan.job.machine.zero], across = own ?? 'x 0, y 0 of the STL';
     const place = `${across}; z 0 at ${above ? 'this layer’s finished top' : onTable ? 'the machine table’s top' : 'the pattern’s bottom, the base board’s top'}`;
-    const xy = `slab’s left edge is x ${millimetres(x0)}, its front edge y ${millimetres(y0)}`;
-    const raw = `raw slab top is z ${millimetres(at.raw)} if the slab is ${figure(layer.slab_thickness, 2)} mm thick: measure it`;
-    const z = onTable ? `touch the machine’s table beside the base board: z 0; or the ${raw}` : !above && l === 0 ? `the base board’s top before the slab is laid is z 0; after that the ${raw}` : raw;
+    const xy = `slab’s left edge is x ${shown(x0)}, its front edge y ${shown(y0)}`;
+    const raw = `raw slab top is z ${shown(at.raw)} if the slab is ${figure(layer.slab_thickness, 2)} mm thick: measure it`;
+    const z = stands(l) ? `leave z 0 where it has been since layer 1; only where it was lost: ${onTable ? 'touch the machine’s table beside the base board, z 0, or the ' : ''}${raw}` : onTable ? `touch the machine’s table beside the base board: z 0; or the ${raw}` : !above && l === 0 ? `the base board’s top before the slab is laid is z 0; after that the ${raw}` : raw;
     if (off && plan.job.machine.zero !== 'corner' && plan.job.machine.zero !== 'pin') warnings.push(`Zero x 0, y 0 lies in the air, ${off} the slab: there is no wood to touch. Touch off the slab’s edges.`);
-    if (!above && !onTable && l > 0) warnings.push(`Z 0 lies ${figure(layer.z_bottom, 2)} mm under this slab, inside the stack: it cannot be touched.`);
+    if (!above && !onTable && l > 0 && !stands(l)) warnings.push(`Z 0 lies ${figure(layer.z_bottom, 2)} mm under this slab, inside the stack: it cannot be touched. Touch off by the raw slab’s top, as it is measured.`);
     const after = own === places.pin ? off ? 'touch the pin; it stays clear of the slab' : 'touch the pin before the slab covers it; the control keeps x and y through the build' : own === places.corner ? 'touch the base board’s left and front edges once; they stay through the build' : off ? '' : woodAfter(l) === false ? 'the raw slab covers x 0, y 0; milled, it is in the air there' : 'the slab covers x 0, y 0';
     return {place, xy, z: [z, probed(l)].filter(Boolean).join('; '), after, warnings};
 }
+
+// What is ticked once layer l's zero is set.
+export const zeroIsSet = l => stands(l) ? 'XY touched off as above, Z left as it was' : probed(l) ? 'XY touched off as above, Z probed by program' : 'XY and Z touched off as above';
 
 // How the control's zero has moved since the first layer, with the table or without it.
 export function tableHeight(l) {
     const {table, base_board_thickness: board} = plan.job.machine, moves = table === 'moving', layer = plan.layers[l];
     const risen = layer.z_top - plan.layers[0].z_top, offset = plan.frame === 'layer-top' ? (moves ? 0 : risen) : (moves ? -risen : 0);
     const standing = moves ? `sunk to ${figure(board + layer.z_top, 2)} mm below this layer’s top` : 'fixed';
-    return offset === 0 ? standing : `${standing}; the work offset’s Z is ${figure(Math.abs(offset), 2)} mm ${offset > 0 ? 'above' : 'below'} that of layer 1`;
+    const by = `${inInches ? `${figure(Math.abs(offset) / 25.4, 4)} in, ` : ''}${figure(Math.abs(offset), 2)} mm`;
+    return offset === 0 ? standing : `${standing}; the work offset’s Z is ${by} ${offset > 0 ? 'above' : 'below'} that of layer 1`;
 }
