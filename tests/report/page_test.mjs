@@ -428,5 +428,24 @@ check.equal('selection: no tables without a choice', await (async () => {
     check.equal('dowels: no complaints', complaints, []);
     await page.close();
 }
+// Inch programs on a table that stays: what the control shows is told in inches, and z 0 is set once.
+{
+    const built = `${work}/inches`, job = `${work}/inches.toml`;
+    writeFileSync(job, '[machine]\nunits = "in"\ntable = "fixed"\ntravel_z = 120.0\nmagazine = 4\n');
+    execFileSync(command, ['plan', `${work}/pump-cover.stl`, '-o', built, '--job', job, '--quiet', '--no-verify']);
+    const made = JSON.parse(readFileSync(`${built}/plan.json`, 'utf8'));
+    const {page, complaints} = await open(started, `${built}/report.html`);
+    const inches = v => `${v < 0 ? '−' : ''}${Number((Math.abs(v) / 25.4).toFixed(4))} in`;
+    for (const [l, layer] of made.layers.entries()) {
+        const text = await page.locator(`#sheet-${l + 1}`).textContent();
+        check.that(`inches: slab’s edges of layer ${l + 1}`, text.includes(`left edge is x ${inches(made.stock.min[0])} (`), text);
+        check.that(`inches: raw top of layer ${l + 1}`, text.includes(`raw slab top is z ${inches(layer.z_bottom + layer.slab_thickness)} (`));
+        check.equal(`inches: z 0 stands in layer ${l + 1}`, text.includes('leave z 0 where it has been since layer 1') && text.includes('Z left as it was'), l > 0);
+        check.that(`inches: no warning of what is left alone in layer ${l + 1}`, !text.includes('cannot be touched'));
+    }
+    check.equal('magazine: places are told by its own table alone', await page.locator('.sheet th', {hasText: /^Place$/}).count(), await page.locator('.sheet h4', {hasText: 'Magazine of 4 places'}).count());
+    check.equal('inches: no complaints', complaints, []);
+    await page.close();
+}
 await started.close();
 check.end();
