@@ -5,18 +5,18 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
 #include "io/slabwright.h"
+#include "tests/support/temporary_folder.h"
 
 namespace slabwright {
 namespace {
@@ -102,8 +102,8 @@ int run(std::span<char*> arguments) {
             parts.emplace_back(arguments[i]);
             continue;
         }
-        if (++i == arguments.size()) return 2;
         libraries.clear();
+        if (++i == arguments.size()) break;
         for (std::string_view rest = arguments[i]; !rest.empty();) {
             const std::size_t comma = std::min(rest.find(','), rest.size());
             libraries.emplace_back(rest.substr(0, comma));
@@ -119,16 +119,12 @@ int run(std::span<char*> arguments) {
     std::printf("\n|---|---|---|");
     for (std::size_t i = 0; i < kColumns.size(); ++i) std::printf("---|");
     std::printf("\n");
-    std::string scratch = (fs::temp_directory_path() / "slabwright_parts_XXXXXX").string();
-    if (::mkdtemp(scratch.data()) == nullptr) {
-        std::fprintf(stderr, "parts_bench: no folder can be made in %s\n", fs::temp_directory_path().c_str());
-        return 1;
-    }
+    const support::TemporaryFolder scratch;
     for (const std::string& tools : libraries) {
         double seconds = 0;
         std::array<double, kColumns.size()> mean{};
         for (const std::string& part : parts) {
-            const Spent spent = plan_and_prove(part, tools, fs::path(scratch) / "out");
+            const Spent spent = plan_and_prove(part, tools, scratch / "out");
             std::array<double, kColumns.size()> shares = spent.seconds();
             for (std::size_t i = 0; i < shares.size(); ++i) {
                 shares[i] /= spent.all();
@@ -139,8 +135,6 @@ int run(std::span<char*> arguments) {
         }
         print_row("all, weighed alike", tools, seconds, mean);
     }
-    std::error_code ignored;
-    fs::remove_all(scratch, ignored);
     return 0;
 }
 
@@ -150,7 +144,7 @@ int run(std::span<char*> arguments) {
 int main(int argc, char** argv) {
     try {
         return slabwright::run(std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
-    } catch (const slabwright::Error& e) {
+    } catch (const std::exception& e) {
         std::fprintf(stderr, "parts_bench: %s\n", e.what());
         return 1;
     }

@@ -257,9 +257,11 @@ private:
     }
     // What was thought to be air, beside the cutter's middle, may have a strip of wood in it.
     void slow_plunges(const StandingSlab& slab) {
-        const auto slow =
-            static_cast<std::uint32_t>(std::max(1.0, std::min(tool_.plunge_feed, job_.machine.max_feed)));
-        for (const std::uint32_t k : slab.plunges()) op_.moves[k].feed = std::min(op_.moves[k].feed, slow);
+        for (const std::uint32_t k : slab.plunges())
+            op_.moves[k].feed = std::min(op_.moves[k].feed, plunge_feed());
+    }
+    [[nodiscard]] std::uint32_t plunge_feed() const {
+        return static_cast<std::uint32_t>(std::max(1.0, std::min(tool_.plunge_feed, job_.machine.max_feed)));
     }
 
     // @param before what stood before the operation
@@ -278,10 +280,8 @@ private:
         std::vector<Passes> passes;
         for (const DeepRun& run : runs) passes.push_back(passes_of(run));
         const std::vector<Move> whole = op_.moves;
-        const auto plunge_feed =
-            static_cast<std::uint32_t>(std::max(1.0, std::min(tool_.plunge_feed, job_.machine.max_feed)));
         const bool by_turns = core_diameter_of(tool_) <= 0;
-        SplitMoves split = split_runs(whole, passes, plunge_feed, by_turns);
+        SplitMoves split = split_runs(whole, passes, plunge_feed(), by_turns);
         // After a run there stands what stood after it before, so only the runs themselves are looked at
         // anew.
         const bool halved = any_halved(memory_.seen, passes);
@@ -297,7 +297,7 @@ private:
         std::vector<MoveRange> parts = look();
         // What earlier rounds have taken away is not gone over again.
         if (without_idle(passes, split.runs, halved ? memory_.seen : memory_.anew)) {
-            split = split_runs(whole, passes, plunge_feed, by_turns);
+            split = split_runs(whole, passes, plunge_feed(), by_turns);
             parts = look();
         }
         if (halved) return;

@@ -347,7 +347,7 @@ private:
         for (ToolCandidate& candidate : selection_->candidates)
             if (candidate.chosen &&
                 std::find(cut_with.begin(), cut_with.end(), candidate.tool) == cut_with.end())
-                candidate.reason += "; not in the set that cuts the layer, which takes less time";
+                candidate.reason += "; the set that cuts the layer does without it";
     }
 
     Context& context_;
