@@ -44,6 +44,13 @@ struct PaceAhead {
     double times = 1.2;  ///< as long, and it is given up; adapted feeds seldom make up for more
 };
 
+/// How deep roughing in terraces may cut where the slab hangs over, mm.
+struct RoughSteps {
+    double last = 0;     ///< that the last levels go down
+    int last_count = 0;  ///< how many these are; 0: any step
+    double deepest = 0;  ///< of all other levels; 0: what the tool takes
+};
+
 /// A layer's work is a value in and a value out.
 struct LayerJob {
     /// The pattern, pattern-base, or a lighter one that lies as near to it as the job's `gouge` leaves room
@@ -64,8 +71,7 @@ struct LayerJob {
     std::vector<Flat> feet;  ///< on which walls of this layer may stand: `flats` and those just below
     bool paced = false;      ///< its pace is asked for
     std::optional<PaceAhead> ahead;  ///< when these tools cannot come near it they are given up
-    double last_steps =
-        0;  ///< mm that the last two levels of roughing may go down, for the wood's sake; 0: any step
+    RoughSteps rough_steps;          ///< of roughing in terraces, for the wood's sake
     ScratchPool<StockMemory>* stock_memory =
         nullptr;  ///< which layers leave to each other; null: this one has its own
 };

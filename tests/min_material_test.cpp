@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <random>
 
 #include "engine/forces/cuts.h"
 #include "engine/forces/min_material.h"
@@ -13,6 +14,7 @@
 #include "engine/tools/tools.h"
 #include "kernels/forces/deflection.h"
 #include "tests/support/height_field.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
@@ -42,18 +44,73 @@ TEST(LeastMaterial, LuoSpecimensOf12BreakAndOf13Hold) {
 }
 
 // Of the wood that hangs over, the last level of roughing meets a sliver: where nothing hangs over, or what
-// does would not bear a whole step anyway, any step will do.
+// does would not bear a step anyway, any step will do.
 TEST(LeastMaterial, LastStepsAreShallowWhereThatSavesTheWood) {
     const Job job = specimen();
     const Tool& tool = job.tools[0];
-    EXPECT_EQ(last_rough_steps(job, tool, 0, 18), 0);
-    const double steps = last_rough_steps(job, tool, 30, 18);
-    EXPECT_GT(steps, 0);
-    EXPECT_LT(steps, least_slab(tool));
-    EXPECT_EQ(last_rough_steps(job, tool, 30, 1), 0) << "a layer of 1 mm bears no step of 3 mm";
-    const double bears = least_material(job, 500);
-    EXPECT_GT(last_rough_steps(job, tool, 1000, bears + 0.01), 0);
-    EXPECT_EQ(last_rough_steps(job, tool, 1000, bears - 0.01), 0);
+    EXPECT_EQ(rough_steps(job, tool, 0, 18).last_count, 0);
+    EXPECT_EQ(rough_steps(job, tool, 0, 18).deepest, 0);
+    const RoughSteps steps = rough_steps(job, tool, 30, 18);
+    EXPECT_GT(steps.last_count, 0);
+    EXPECT_LT(steps.last, least_slab(tool));
+    EXPECT_EQ(rough_steps(job, tool, 30, 0.9).last_count, 0) << "a layer of .9 mm bears no step of 3 mm";
+    EXPECT_GT(rough_steps(job, tool, 1000, least_material(job, 500) + 0.01).last_count, 0);
+    EXPECT_EQ(rough_steps(job, tool, 30000, 18).last_count, 0);
+}
+
+// The thinnest slab that bears a cut of `deep` so far out: least_material of a tool that goes no deeper.
+double bears(Job job, double deep, double overhang_mm) {
+    job.tools[0].stepdown_max = deep;
+    return least_material(job, overhang_mm);
+}
+
+// Cutters that may go deeper than a slab is thick: of all ways to divide a layer into even levels over one or
+// two shallow ones, the one with the fewest levels that the wood bears.
+TEST(LeastMaterial, StepsAreAsDeepAsTheWoodBears) {
+    std::mt19937 random(test::seed());
+    const auto between = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    int one = 0, two = 0, none = 0, limited = 0;
+    for (int k = 0; k < 300; ++k) {
+        Job job = specimen();
+        Tool& tool = job.tools[0];
+        tool.diameter = tool.shank_diameter = between(6, 26);
+        tool.stepdown_min = between(0.5, 3);
+        tool.stepdown_max = std::min(between(0.3, 2) * tool.diameter, tool.flute_length);
+        if (tool.stepdown_max < tool.stepdown_min) continue;
+        const double overhang = between(5, 300), layer = between(8, 36), least = tool.stepdown_min;
+        const RoughSteps steps = rough_steps(job, tool, overhang, layer);
+        EXPECT_NEAR(steps.last, 0.9 * least, 1e-9);
+        const auto holds = [&](double deep, int count) {
+            return count == 2 ? bears(job, deep, overhang * 2 / 3) <= layer
+                              : bears(job, deep, overhang * 3 / 4) <= steps.last + deep;
+        };
+        int fewest = 1000, count_then = 0;
+        for (const int count : {2, 1})
+            for (int even = 1; even < 80; ++even) {
+                const double deep = (layer - count * steps.last) / even;
+                if (deep < least || deep > tool.stepdown_max) continue;
+                if (holds(deep, count)) {
+                    if (even + count < fewest) fewest = even + count, count_then = count;
+                } else {
+                    ++limited;
+                }
+            }
+        if (count_then == 0) {
+            EXPECT_NEAR(steps.deepest, std::min(tool.stepdown_max, 1.5 * least), 1e-9);
+            ++none;
+            continue;
+        }
+        EXPECT_EQ(steps.last_count, count_then);
+        EXPECT_NEAR(steps.deepest, (layer - count_then * steps.last) / (fewest - count_then), 1e-9);
+        ++(count_then == 1 ? one : two);
+    }
+    std::printf("one last level %d times, two %d times, none bears %d times\n", one, two, none);
+    EXPECT_GT(one, 20);
+    EXPECT_GT(two, 20);
+    EXPECT_GT(none, 5);
+    EXPECT_GT(limited, 100);
 }
 
 TEST(LeastMaterial, GrowsWithOverhangAndForceAndFallsWithStrength) {

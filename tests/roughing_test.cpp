@@ -53,7 +53,7 @@ struct Roughed {
         layer.job = &job;
         layer.z_top = layer.slab_thickness = kTop;
         layer.stock_min = low, layer.stock_max = high;
-        layer.last_steps = last_steps;
+        layer.rough_steps = {last_steps, last_steps > 0 ? 2 : 0, 0};
         layer.tools.rough = tool_of_kind(job, ToolKind::flat);
         layer.tools.finish = tool_of_kind(job, ToolKind::ball);
         cut.standing = &standing;
@@ -177,6 +177,16 @@ TEST(Roughing, LevelsGoAsDeepAsTheToolMayAndTerracesOnlyWhereTheyCut) {
         EXPECT_TRUE(std::any_of(at_level.begin(), at_level.end(), [&](double z) {
             return std::abs(z - (kTop - kTop * k / levels)) < 1e-3;
         })) << k;
+}
+
+TEST(Roughing, LevelsGoNoDeeperThanTheWoodBears) {
+    constexpr double kDeepest = 2.1;
+    Roughed r(hill, {-45, -45}, {45, 45}, 1);
+    r.layer.rough_steps.deepest = kDeepest;
+    ASSERT_GT(r.layer.tools.rough.stepdown_max, kDeepest);
+    r.rough();
+    EXPECT_LE(r.op.stepdown, kDeepest + 1e-9);
+    EXPECT_LE(r.deepest_cut, kDeepest + 1e-3);
 }
 
 // One small thing in the corner of a wide stock: rectangles leave only what is next to it to rings, and

@@ -56,6 +56,11 @@ std::vector<ToolSet> sets_of(double strength_mpa) {
     });
     Job job;
     job.tools = shop_library();
+    // At steps as deep as the wall is high a wall that breaks under all cutters is given up sooner.
+    for (Tool& tool : job.tools)
+        for (const Tool& luo : luo_library())
+            if (tool.kind == ToolKind::flat && luo.kind == tool.kind && luo.diameter == tool.diameter)
+                tool.stepdown_max = luo.stepdown_max;
     job.slabs.thicknesses = {19};
     job.material.strength_mpa = strength_mpa;
     job.bonding.accept_weak = true;

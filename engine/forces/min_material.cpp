@@ -142,11 +142,27 @@ double least_material(const Job& job, double overhang_mm) {
     return least;
 }
 
-double last_rough_steps(const Job& job, const Tool& tool, double overhang_mm, double layer_mm) {
+RoughSteps rough_steps(const Job& job, const Tool& tool, double overhang_mm, double layer_mm) {
+    if (!(overhang_mm > 0)) return {};
     constexpr double kSliver = 0.9;  // of the thinnest slab
-    return overhang_mm > 0 && thickness_at(job, tool, tool.stepdown_max, overhang_mm / 2).least_mm <= layer_mm
-               ? kSliver * least_slab(tool)
-               : 0;
+    const double least = least_slab(tool), last = kSliver * least;
+    int most = 0;  // last levels that have room
+    while (most < 2 && layer_mm - most * last > 1.5 * last) ++most;
+    const int finest = most + static_cast<int>(layer_mm / least);
+    // Roughing seldom meets as hard a cut as this is reckoned by.
+    const auto holds = [&](double step, int count) {
+        const bool usual = count == most;
+        return thickness_at(job, tool, step, (usual ? 2.0 / 3 : 0.75) * overhang_mm).least_mm <=
+               (usual ? layer_mm : count * last + step);
+    };
+    for (int levels = 1; levels <= finest; ++levels)
+        for (int count = std::min(most, levels - 1); count >= std::min(1, most); --count) {
+            const double step = (layer_mm - count * last) / (levels - count);
+            if (step >= least && step <= tool.stepdown_max + 1e-9 && holds(step, count))
+                return {last, count, step};
+        }
+    const double deepest = std::min(tool.stepdown_max, 1.5 * least);
+    return {last, thickness_at(job, tool, deepest, overhang_mm / 2).least_mm <= layer_mm ? most : 0, deepest};
 }
 
 SlabOverhang slab_overhang(Context& context, MeshView mesh, const Plan& plan) {

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "engine/layer_job.h"
 #include "engine/plan.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
@@ -20,13 +21,17 @@ namespace slabwright {
 /// @throws Error(usage, "forces.segment") for a tool or material that the force model does not take
 [[nodiscard]] double least_material(const Job& job, double overhang_mm);
 
-/// How far down the last two levels of roughing go where a slab hangs over by up to `overhang_mm`, mm: the
-/// last one cuts through no more than a sliver that tears off (least_slab), for a slab as thin as a whole
-/// step would bend, and the one before it meets no more than the wood then bears. 0, any step, where nothing
-/// hangs over, and where the whole layer would not bear a full step even half as far out: what breaks there
-/// breaks anyway.
+/// The steps of roughing for the wood's sake, where a slab hangs over by up to `overhang_mm`: the last two
+/// levels are shallow, so that the last one cuts through no more than a sliver that tears off (least_slab),
+/// for a slab as thin as a whole step would bend; the others are even and no finer than the tool is made for,
+/// and the layer bears their cuts two thirds as far out, for roughing seldom meets the hardest cut, which
+/// this is reckoned by. Only the last level is shallow where that makes a level fewer, and what is over it
+/// bears the lowest of the others three quarters as far out. Where there are no such steps all are shallow,
+/// and where the layer would not bear them even half as far out the last two are as the others: what breaks
+/// there breaks anyway.
+/// @param layer_mm its height
 /// @throws Error(usage, "forces.segment") as least_material
-[[nodiscard]] double last_rough_steps(const Job& job, const Tool& tool, double overhang_mm, double layer_mm);
+[[nodiscard]] RoughSteps rough_steps(const Job& job, const Tool& tool, double overhang_mm, double layer_mm);
 
 /// How far each place of the stock lies from what carries it, on a grid of 1/256 of the stock's longer side.
 struct OverhangMap {

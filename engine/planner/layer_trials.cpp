@@ -92,10 +92,9 @@ void LayerTrials::set_tools(const LayerTools& tools) {
     work_.floor_below = layer_.z_bottom - (ground_.carried_by ? below : board);
     work_.feet = flats_between(work_.floor_below);
     work_.paced = compared_;
-    work_.last_steps =
-        overhang_ ? last_rough_steps(job, tools.rough, overhang_->largest() + job.bonding.edge_setback,
-                                     layer_.z_top - layer_.z_bottom)
-                  : 0;
+    work_.rough_steps =
+        rough_steps(job, tools.rough, overhang_ ? overhang_->largest() + job.bonding.edge_setback : 0,
+                    layer_.z_top - layer_.z_bottom);
 }
 
 LayerPaths LayerTrials::begin(const LayerTools& tools) {

@@ -83,8 +83,13 @@ const Tool& face_mill(const Job& job) {
     throw Error(ErrorKind::usage, "job.tool", "the library has no face mill", "tool", "give one");
 }
 
+/// Deeper cuts leave terraces and shallow last levels to be cut, so that they count as no deeper, mm.
+constexpr double kDeepest = 8;
+
 /// mm³ that a tool takes away over a millimetre of clearing.
-double swath(const Tool& tool) { return tool.diameter * tool.stepover * tool.stepdown_max; }
+double swath(const Tool& tool) {
+    return tool.diameter * tool.stepover * std::min(tool.stepdown_max, kDeepest);
+}
 
 double perimeter(std::span<const Point2> loop) {
     double sum = 0;

@@ -101,8 +101,8 @@ public:
             flat_level_stepdown(slopes_of(context_, layer_).least, base.finish.diameter / 2), height);
         for (Tool rough : flats_) {
             if (rough.diameter < base.rough.diameter - 1e-9) break;
-            rough.stepdown_min = rough.stepdown_max =
-                std::clamp(allowed, std::min(rough.stepdown_min, height), rough.stepdown_max);
+            const double step = std::clamp(allowed, std::min(rough.stepdown_min, height), rough.stepdown_max);
+            rough.stepdown_min = step;       // of terraces, between levels as deep as the tool may cut
             constexpr double kDeeper = 1.2;  // times as deep: less hardly makes a level fewer
             if (rough.diameter <= base.rough.diameter + 1e-9 &&
                 rough.stepdown_max < kDeeper * base.rough.stepdown_max)
@@ -111,7 +111,7 @@ public:
             tools.finish = base.finish;
             tools.rough = rough;
             tools.rest = rest_tools(job_, rough, base.finish.diameter);
-            if (left(rough, rough.stepdown_max, swath).nothing(job_.selection.voxel)) continue;
+            if (left(rough, step, swath).nothing(job_.selection.voxel)) continue;
             for (Tool semi : flats_) {
                 if (semi.diameter >= rough.diameter - 1e-9) continue;
                 if (semi.diameter < base.finish.diameter / 2 - 1e-9) break;

@@ -41,6 +41,12 @@ void make_of_carbide(std::span<Tool> tools) {
         if (is_end_mill(tool.kind) && tool.diameter <= kWidestSolid) tool.modulus_gpa = kCarbideGpa;
 }
 
+/// How deep flats of these widths may cut in MDF, in diameters, at the chip of .25 mm that max_feed and
+/// max_rpm make: charts (CuttingChart::mdf) have .5 mm a tooth for 1/2 in one diameter deep and a quarter
+/// less two deep, .3 mm for 1/4 in one deep, and nothing wider; of 1/8 in they have .1 mm, so it stays at
+/// LUO's depth.
+constexpr double kWholeDepth = 1, kHalfDepth = 2, kQuarterDepth = 1;
+
 /// A row of LUO table 5.4, inches: the diameter, and the range of its stepdown.
 struct LuoRow {
     double diameter, low, high;
@@ -57,6 +63,12 @@ Size in_mm(const char* name, double diameter, const LuoRow& row, double flute, d
            double holder) {
     const double scale = diameter / row.diameter;
     return {name, diameter, row.low * scale, row.high * scale, flute, stickout, holder};
+}
+
+// The size, but for stepdowns up to so many of its diameters.
+Size up_to(Size size, double diameters) {
+    size.stepdown_max = diameters * size.diameter;
+    return size;
 }
 
 // The size with its cutter on a thicker shank.
@@ -85,8 +97,10 @@ std::vector<Tool> shop_library() {
     // tall.
     const Size eighth = on_shank(in_inches("1/8 in", kEighth, kInch, 36, 32), 0.25 * kInch);
     std::vector<Tool> tools = Job{}.tools;
-    tools.push_back(end_mill(4, ToolKind::flat, in_inches("1 in", kWhole, 50.8, 75, 50)));
-    tools.push_back(end_mill(5, ToolKind::flat, in_inches("1/4 in", kQuarter, kInch, 38, 32)));
+    tools[1].stepdown_max = kHalfDepth * tools[1].diameter;
+    tools.push_back(end_mill(4, ToolKind::flat, up_to(in_inches("1 in", kWhole, 50.8, 75, 50), kWholeDepth)));
+    tools.push_back(
+        end_mill(5, ToolKind::flat, up_to(in_inches("1/4 in", kQuarter, kInch, 38, 32), kQuarterDepth)));
     tools.push_back(end_mill(6, ToolKind::flat, eighth));
     tools.push_back(end_mill(7, ToolKind::ball, in_inches("1/2 in", kHalf, 32, 50, 40)));
     tools.push_back(end_mill(8, ToolKind::ball, eighth));
@@ -122,10 +136,10 @@ std::vector<Tool> metric_library() {
     const Size six = in_mm("6 mm", 6, kQuarter, 30, 45, 32);
     const Size twelve = in_mm("12 mm", 12, kHalf, 32, 50, 40);
     std::vector<Tool> tools{Job{}.tools.front()};
-    tools.push_back(end_mill(2, ToolKind::flat, twelve));
+    tools.push_back(end_mill(2, ToolKind::flat, up_to(twelve, kHalfDepth)));
     tools.push_back(end_mill(3, ToolKind::ball, six));
-    tools.push_back(end_mill(4, ToolKind::flat, in_mm("25 mm", 25, kWhole, 50, 75, 50)));
-    tools.push_back(end_mill(5, ToolKind::flat, six));
+    tools.push_back(end_mill(4, ToolKind::flat, up_to(in_mm("25 mm", 25, kWhole, 50, 75, 50), kWholeDepth)));
+    tools.push_back(end_mill(5, ToolKind::flat, up_to(six, kQuarterDepth)));
     tools.push_back(end_mill(6, ToolKind::flat, three));
     tools.push_back(end_mill(7, ToolKind::ball, twelve));
     tools.push_back(end_mill(8, ToolKind::ball, three));

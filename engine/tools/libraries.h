@@ -14,14 +14,15 @@ namespace slabwright {
 /// does not give is ours.
 [[nodiscard]] std::vector<Tool> luo_library();
 
-/// What a shop that mills wood has: the three tools of the fixed set, unchanged and with their numbers, then
-/// flat end mills of 1, 1/4 and 1/8 in and ball end mills of 1/2 and 1/8 in, numbers 4 … 8, those of 1/8 in
-/// on shanks of 1/4 in. Stepdowns are LUO table 5.4's; lengths, holders and which sizes there are, are ours.
+/// What a shop that mills wood has: the three tools of the fixed set with their numbers, then flat end mills
+/// of 1, 1/4 and 1/8 in and ball end mills of 1/2 and 1/8 in, numbers 4 … 8, those of 1/8 in on shanks of 1/4
+/// in. Flats of 1/4 in and wider cut as deep as published chip loads allow at their feed (METHOD.md section
+/// 7); other stepdowns are LUO table 5.4's. Lengths, holders and which sizes there are, are ours.
 [[nodiscard]] std::vector<Tool> shop_library();
 
 /// The same in millimetres: face mill 50, flat 12 and ball 6 with the numbers of the fixed set, then flat end
-/// mills of 25, 6 and 3 and ball end mills of 12 and 3. Stepdowns are LUO's of the nearest size in inches, in
-/// proportion to the diameter; the rest is ours.
+/// mills of 25, 6 and 3 and ball end mills of 12 and 3. Stepdowns are in proportion to the diameter those of
+/// the shop's nearest size in inches; the rest is ours.
 [[nodiscard]] std::vector<Tool> metric_library();
 
 /// A cutter of each form that a shop has, eight tools: the three of the fixed set with their numbers, a

@@ -60,7 +60,7 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.key("plunge_feed", tool.plunge_feed, "mm/min straight down");
     visit.key("stepdown_min", tool.stepdown_min, "mm");
     visit.required();
-    visit.key("stepdown_max", tool.stepdown_max, "mm (LUO table 5.4)");
+    visit.key("stepdown_max", tool.stepdown_max, "mm, the deepest that it cuts at once");
     visit.key("stepover", tool.stepover, "share of the diameter, for clearing");
     visit.key("strength_mpa", tool.strength_mpa,
               "MPa, the cutter's own in bending, as its maker states it; 0: not checked");

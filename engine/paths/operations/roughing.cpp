@@ -117,18 +117,19 @@ std::vector<RoughStep> level_steps(const LayerCut& cut, const Tool& tool, double
     return steps;
 }
 
-// Even levels, as deep as the tool may cut (but see LayerJob::last_steps), and over each of them terraces
+// Even levels, as deep as the tool may cut (but see RoughSteps), and over each of them terraces
 // where stepped() puts levels, from below: what is cut there are only the slopes and floors that the level
 // has left standing.
 std::vector<RoughStep> terraced_steps(const LayerCut& cut, const Tool& tool, double floor) {
     const std::vector<RoughLevel> fixed = fixed_levels(cut, tool, floor);
     const double top = cut.layer.z_top, bottom = cut.layer.z_bottom;
     std::vector<double> tips{bottom};
-    if (const double shallow = cut.layer.last_steps; shallow > 0)
-        for (int k = 0; k < 2 && top - tips.back() > 1.5 * shallow; ++k)
-            tips.push_back(tips.back() + shallow);
+    const RoughSteps& wood = cut.layer.rough_steps;
+    for (int k = 0; k < wood.last_count && top - tips.back() > 1.5 * wood.last; ++k)
+        tips.push_back(tips.back() + wood.last);
     const double rest = top - tips.back();
-    const int count = static_cast<int>(std::ceil(rest / tool.stepdown_max - 1e-9));
+    const double deepest = wood.deepest > 0 ? std::min(tool.stepdown_max, wood.deepest) : tool.stepdown_max;
+    const int count = static_cast<int>(std::ceil(rest / deepest - 1e-9));
     for (int k = 1; k < count; ++k) tips.push_back(top - rest * (count - k) / count);
     std::vector<RoughStep> steps;
     double above = top;
