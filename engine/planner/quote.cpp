@@ -83,8 +83,8 @@ const Tool& face_mill(const Job& job) {
     throw Error(ErrorKind::usage, "job.tool", "the library has no face mill", "tool", "give one");
 }
 
-/// Deeper cuts leave terraces and shallow last levels to be cut, so that they count as no deeper, mm.
-constexpr double kDeepest = 8;
+/// mm, to which the rates are fitted: LUO's for 1/2 in. Deeper cuts leave terraces and shallow last levels.
+constexpr double kDeepest = 0.15 * kInch;
 
 /// mm³ that a tool takes away over a millimetre of clearing.
 double swath(const Tool& tool) {
