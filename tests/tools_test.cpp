@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <vector>
 
+#include "engine/cutting_data.h"
 #include "engine/planner/planner.h"
 #include "engine/tool_choice/select.h"
 #include "engine/tools/libraries.h"
@@ -94,9 +97,38 @@ TEST(Tools, TheShopsLibraries) {
         for (const Tool& printed : luo)
             if (tool.kind == printed.kind && std::abs(tool.diameter - printed.diameter) < 1e-9) {
                 EXPECT_EQ(tool.stepdown_min, printed.stepdown_min) << tool.name;
-                EXPECT_EQ(tool.stepdown_max, printed.stepdown_max) << tool.name;
+                if (tool.kind != ToolKind::flat || tool.diameter < 4) {
+                    EXPECT_EQ(tool.stepdown_max, printed.stepdown_max) << tool.name;
+                }
             }
-    EXPECT_NEAR(metric_library()[3].stepdown_max, 6.25, 1e-12);  // 25 mm at a quarter, as 1 in
+}
+
+// Charts of chip loads in MDF hold one diameter deep; two deep they are a quarter less, three deep a half.
+TEST(Tools, FlatsOfTheShopGoAsDeepAsPublishedChipLoadsAllow) {
+    int charted = 0;
+    for (const std::vector<Tool>& tools : {shop_library(), metric_library()})
+        for (const Tool& tool : tools) {
+            if (tool.kind != ToolKind::flat) continue;
+            const double deep = tool.stepdown_max / tool.diameter,
+                         chip = tool.max_feed / (tool.max_rpm * tool.flutes);
+            EXPECT_LE(tool.stepdown_max, tool.flute_length);
+            const std::span<const CuttingData> lines = lines_of(CuttingChart::mdf);
+            const auto line = std::find_if(lines.begin(), lines.end(), [&](const CuttingData& data) {
+                return covers(data, tool.kind, tool.diameter, tool.flutes);
+            });
+            if (line == lines.end()) {
+                EXPECT_GT(tool.diameter, 13) << tool.name;
+                EXPECT_NEAR(deep, 1, 1e-12) << "wider than all of the chart";
+                continue;
+            }
+            int allowed = 0;
+            for (const double share : {1.0, 0.75, 0.5})
+                if (share * line->chip_load >= chip) ++allowed;
+            if (allowed == 0) EXPECT_LE(deep, 0.5 + 1e-12) << tool.name << ": Luo's";
+            else EXPECT_NEAR(deep, std::min(allowed, 2), 1e-12) << tool.name;
+            ++charted;
+        }
+    EXPECT_EQ(charted, 6);
 }
 
 TEST(Tools, LevelsAreEvenDownToEveryFloor) {

@@ -161,7 +161,7 @@ RoughSteps rough_steps(const Job& job, const Tool& tool, double overhang_mm, dou
             if (step >= least && step <= tool.stepdown_max + 1e-9 && holds(step, count))
                 return {last, count, step};
         }
-    const double deepest = std::min(tool.stepdown_max, 1.5 * least);
+    const double deepest = shallow_step(tool);
     return {last, thickness_at(job, tool, deepest, overhang_mm / 2).least_mm <= layer_mm ? most : 0, deepest};
 }
 

@@ -159,6 +159,38 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
                at_once;
 }
 
+// Whether flats cut deeper than where their push matters.
+bool may_go_deep(const Job& job) {
+    return std::any_of(job.tools.begin(), job.tools.end(), [](const Tool& tool) {
+        return roughs_layers(tool.kind) && shallow_step(tool) < tool.stepdown_max;
+    });
+}
+
+// What of a layer, in plan, its own programs may break off its glue.
+double lost_mm2(const Layer& layer, std::span<const JointWood> wood, const Plan& plan) {
+    double sum = 0;
+    for (const WeakJoint& weak : joints_under_load(layer, wood, plan)) sum += weak.lost_mm2;
+    return sum;
+}
+
+struct RatedLayer {
+    Layer layer;
+    std::vector<Diagnostic> planned, rated;
+};
+
+// Plans a layer that is planned already once more, with shallow cuts: they push less, and roughing bends what
+// stands free by no more than a step over its joint.
+RatedLayer plan_gently(Context& context, const LayerGround& ground, std::size_t i) {
+    Plan one;
+    one.job = ground.plan.job;
+    one.stock_min = ground.plan.stock_min, one.stock_max = ground.plan.stock_max;
+    ProgressPart none(context, 0);
+    PlannedLayer planned = plan_layer(context, ground, i, none);
+    one.layers.push_back(std::move(planned.layer));
+    std::vector<std::vector<Diagnostic>> rated = rate_layers(context, one, {&planned.cuts, 1}, nullptr);
+    return {std::move(one.layers.front()), std::move(planned.diagnostics), std::move(rated.front())};
+}
+
 // Adds the programs of dowel holes, last in their layers. Their forces are not reckoned, as no drill's are.
 void drill_dowels(Plan& plan) {
     double deepest = 0;
@@ -205,14 +237,17 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern,
     ScratchPool<StockMemory> stock_memory;
     KnownCuts known_cuts;
     SolverAhead solver(context);
+    const auto ground_under = [&](std::size_t i, bool shallow) {
+        const Loops* const carried_by = i > 0 ? &joints[i].front().below : nullptr;
+        return LayerGround{
+            plan,       ground.pattern, ground.mesh, ground.gap,          scene ? &*scene : nullptr,
+            carried_by, &stock_memory,  feet[i],     &drilling.layers[i], &known_cuts,
+            shallow};
+    };
     parallel_each(context, plan.layers.size(), [&](std::size_t task) {
         const std::size_t i = largest_first[task < half ? 2 * task : 2 * (task - half) + 1];
         ProgressPart progress(context, steps[i]);
-        const Loops* const carried_by = i > 0 ? &joints[i].front().below : nullptr;
-        planned[i] = plan_layer(context,
-                                {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr,
-                                 carried_by, &stock_memory, feet[i], &drilling.layers[i], &known_cuts},
-                                i, progress);
+        planned[i] = plan_layer(context, ground_under(i, false), i, progress);
         solver.expect(planned[i].cuts.cuts);
     });
     std::vector<LayerCuts> cuts;
@@ -222,8 +257,19 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern,
     }
     context.begin_phase("forces", share.at(0.96), share.at(0.99));
     std::vector<std::vector<Diagnostic>> rated(planned.size());
-    if (job.cutting.engagement == Engagement::simulated)
+    if (job.cutting.engagement == Engagement::simulated) {
         rated = rate_layers(context, plan, cuts, solver.solver());
+        if (may_go_deep(job))
+            parallel_each(context, planned.size(), [&](std::size_t i) {
+                const double lost = lost_mm2(plan.layers[i], joints[i], plan);
+                if (lost == 0) return;
+                RatedLayer gentle = plan_gently(context, ground_under(i, true), i);
+                if (lost_mm2(gentle.layer, joints[i], plan) >= lost) return;
+                plan.layers[i] = std::move(gentle.layer);
+                planned[i].diagnostics = std::move(gentle.planned);
+                rated[i] = std::move(gentle.rated);
+            });
+    }
     drill_dowels(plan);
     keep_clear(plan, origin);
     parallel_each(context, planned.size(), [&](std::size_t i) {

@@ -25,6 +25,7 @@ struct LayerGround {
     std::span<const StandingFoot> walls{};  ///< feet of thin walls that stand in this layer
     const std::vector<DrilledHole>* drilled = nullptr;  ///< of this layer, closed in `mesh`; null: none
     KnownCuts* known_cuts = nullptr;  ///< which layers tell each other; null: each finds its own
+    bool shallow = false;             ///< flats cut no deeper than shallow_step() at once
 };
 
 struct PlannedLayer {

@@ -37,6 +37,26 @@ double minutes_of(const Layer& layer, const Machine& machine) {
     return minutes;
 }
 
+// The job's tool, no deeper than one of a set, whose stepdowns may have been narrowed.
+Tool in_full(const Job& job, const Tool& of_set) {
+    Tool tool = *std::find_if(job.tools.begin(), job.tools.end(),
+                              [&](const Tool& t) { return t.number == of_set.number; });
+    tool.stepdown_max = of_set.stepdown_max;
+    tool.stepdown_min = std::min(tool.stepdown_min, tool.stepdown_max);
+    return tool;
+}
+
+void make_shallow(const Job& job, LayerTools& tools) {
+    const auto lower = [&](Tool& tool) {
+        if (!roughs_layers(tool.kind)) return;
+        tool.stepdown_max = shallow_step(in_full(job, tool));
+        tool.stepdown_min = std::min(tool.stepdown_min, tool.stepdown_max);
+    };
+    lower(tools.rough);
+    for (Tool& tool : tools.semi_rough) lower(tool);
+    for (Tool& tool : tools.rest) lower(tool);
+}
+
 }  // namespace
 
 LayerTrials::LayerTrials(Context& context, const LayerGround& ground, std::size_t index)
@@ -87,14 +107,15 @@ std::vector<Flat> LayerTrials::flats_between(double z) const {
 void LayerTrials::set_tools(const LayerTools& tools) {
     const Job& job = ground_.plan.job;
     work_.tools = tools;
+    if (ground_.shallow) make_shallow(job, work_.tools);
     const double below = tools.finish.diameter / 2;
     const double board = job.machine.base_board_cut >= 0 ? overrun_.board : std::min(below, overrun_.board);
     work_.floor_below = layer_.z_bottom - (ground_.carried_by ? below : board);
     work_.feet = flats_between(work_.floor_below);
     work_.paced = compared_;
-    work_.rough_steps =
-        rough_steps(job, tools.rough, overhang_ ? overhang_->largest() + job.bonding.edge_setback : 0,
-                    layer_.z_top - layer_.z_bottom);
+    work_.rough_steps = rough_steps(job, in_full(job, work_.tools.rough),
+                                    overhang_ ? overhang_->largest() + job.bonding.edge_setback : 0,
+                                    layer_.z_top - layer_.z_bottom);
 }
 
 LayerPaths LayerTrials::begin(const LayerTools& tools) {

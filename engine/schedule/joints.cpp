@@ -549,7 +549,7 @@ std::vector<WeakJoint> joints_under_load(const Layer& layer, std::span<const Joi
                  size_of(pieces.regions[which], pieces.boxes[which]), worst_area, worst, bears),
              middle_of(pieces.boxes[which], wood[k].z),
              std::string("fasten it with dowels, cut it with less force (smaller tools), ") + kOtherJoint,
-             sum > kFewPieces * area(wood[k].above)});
+             sum > kFewPieces * area(wood[k].above), sum});
     }
     return weak;
 }

@@ -54,6 +54,7 @@ struct WeakJoint {
     std::array<double, 3> where{};
     std::string remedy;
     bool refused = true;  ///< false: it deserves care, and the build goes on
+    double lost_mm2 = 0;  ///< of joint.weak: what of the layer may break off, in plan
 };
 
 /// Fills layer.joints: glue, force and pressure of each. The force is the press's own, less where the glue

@@ -54,6 +54,8 @@ double least_slab(const Tool& tool) {
     return tool.stepdown_min > 0 ? tool.stepdown_min : tool.stepdown_max / 2;
 }
 
+double shallow_step(const Tool& tool) { return std::min(tool.stepdown_max, 1.5 * least_slab(tool)); }
+
 std::vector<Tool> rest_tools(const Job& job, const Tool& rough, double finish_diameter) {
     // What a flat reaches at a corner a smaller one reaches too, and so it is with balls: the smallest of
     // either kind leave no more than all together.

@@ -34,6 +34,9 @@ struct LayerTools {
 /// over is a sliver that tears off when it is cut.
 [[nodiscard]] double least_slab(const Tool& tool);
 
+/// How deep a tool cuts where its push matters more than time, mm: one and a half times least_slab().
+[[nodiscard]] double shallow_step(const Tool& tool);
+
 /// The set with the stiffest twin of each tool in its place: as wide, of its kind, that bends less under
 /// the same force; none where no tool has one. Stepdowns stay.
 [[nodiscard]] std::optional<LayerTools> stiffer_tools(const Job& job, const LayerTools& tools);
