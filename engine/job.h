@@ -90,7 +90,7 @@ struct Tool {
     double max_rpm = 18000;
     double max_feed = 9000;                     ///< mm/min, along the path
     double plunge_feed = 1500;                  ///< mm/min, straight down
-    double stepdown_min = 0, stepdown_max = 0;  ///< mm, as LUO table 5.4 has them
+    double stepdown_min = 0, stepdown_max = 0;  ///< mm, as in LUO table 5.4
     double stepover = 0.5;                      ///< share of the diameter, for clearing
     bool plunges = false;                       ///< cuts straight down into stock (plunges_by_default)
     double strength_mpa = 0;  ///< the cutter's own in bending, as its maker states it; 0: not checked

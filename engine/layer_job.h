@@ -47,7 +47,7 @@ struct PaceAhead {
 /// How deep roughing in terraces may cut where the slab hangs over, mm.
 struct RoughSteps {
     double last = 0;     ///< that the last levels go down
-    int last_count = 0;  ///< how many these are; 0: any step
+    int last_count = 0;  ///< how many these are
     double deepest = 0;  ///< of all other levels; 0: what the tool takes
 };
 
