@@ -539,7 +539,7 @@ TEST(Command, SummaryTellsWhatToLoad) {
         slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "out"});
     ASSERT_EQ(result.exit, 0) << result.err;
     for (const char* wanted :
-         {"layers", "min", "slabs", "19 mm MDF", "T2 flat end mill 1/2 in", "layer   1: 0 to"})
+         {"layers", "min", "slabs", "19 mm MDF", "T4 flat end mill 1 in", "layer   1: 0 to"})
         EXPECT_NE(result.out.find(wanted), std::string::npos) << wanted << "\n" << result.out;
     const CommandResult quiet =
         slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "out", "--quiet"});

@@ -50,7 +50,9 @@ TEST(LeastMaterial, LastStepsAreShallowWhereThatSavesTheWood) {
     const Tool& tool = job.tools[0];
     EXPECT_EQ(rough_steps(job, tool, 0, 18).last_count, 0);
     EXPECT_EQ(rough_steps(job, tool, 0, 18).deepest, 0);
-    const RoughSteps steps = rough_steps(job, tool, 30, 18);
+    const RoughSteps near = rough_steps(job, tool, 30, 18), steps = rough_steps(job, tool, 100, 18);
+    EXPECT_EQ(near.last_count, 0) << "3 mm of wood bear a step of 3 mm";
+    EXPECT_NEAR(near.deepest, 3, 1e-9);
     EXPECT_GT(steps.last_count, 0);
     EXPECT_LT(steps.last, least_slab(tool));
     EXPECT_EQ(rough_steps(job, tool, 30, 0.9).last_count, 0) << "a layer of .9 mm bears no step of 3 mm";
@@ -71,8 +73,8 @@ TEST(LeastMaterial, StepsAreAsDeepAsTheWoodBears) {
     const auto between = [&](double low, double high) {
         return std::uniform_real_distribution<double>(low, high)(random);
     };
-    int one = 0, two = 0, none = 0, limited = 0;
-    for (int k = 0; k < 300; ++k) {
+    int shallow[3] = {}, none = 0, limited = 0;
+    for (int k = 0; k < 1000; ++k) {
         Job job = specimen();
         Tool& tool = job.tools[0];
         tool.diameter = tool.shank_diameter = between(6, 26);
@@ -84,10 +86,10 @@ TEST(LeastMaterial, StepsAreAsDeepAsTheWoodBears) {
         EXPECT_NEAR(steps.last, 0.9 * least, 1e-9);
         const auto holds = [&](double deep, int count) {
             return count == 2 ? bears(job, deep, overhang * 2 / 3) <= layer
-                              : bears(job, deep, overhang * 3 / 4) <= steps.last + deep;
+                              : bears(job, deep, overhang * 3 / 4) <= count * steps.last + deep;
         };
-        int fewest = 1000, count_then = 0;
-        for (const int count : {2, 1})
+        int fewest = 1000, count_then = -1;
+        for (const int count : {2, 1, 0})
             for (int even = 1; even < 80; ++even) {
                 const double deep = (layer - count * steps.last) / even;
                 if (deep < least || deep > tool.stepdown_max) continue;
@@ -97,18 +99,18 @@ TEST(LeastMaterial, StepsAreAsDeepAsTheWoodBears) {
                     ++limited;
                 }
             }
-        if (count_then == 0) {
+        if (count_then < 0) {
             EXPECT_NEAR(steps.deepest, std::min(tool.stepdown_max, 1.5 * least), 1e-9);
             ++none;
             continue;
         }
         EXPECT_EQ(steps.last_count, count_then);
         EXPECT_NEAR(steps.deepest, (layer - count_then * steps.last) / (fewest - count_then), 1e-9);
-        ++(count_then == 1 ? one : two);
+        ++shallow[count_then];
     }
-    std::printf("one last level %d times, two %d times, none bears %d times\n", one, two, none);
-    EXPECT_GT(one, 20);
-    EXPECT_GT(two, 20);
+    std::printf("no shallow level %d times, one %d times, two %d times, none bears %d times\n", shallow[0],
+                shallow[1], shallow[2], none);
+    for (const int times : shallow) EXPECT_GT(times, 20);
     EXPECT_GT(none, 5);
     EXPECT_GT(limited, 100);
 }

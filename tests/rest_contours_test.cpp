@@ -295,6 +295,74 @@ TEST(RestContours, ABallsRingsKeepOffTheSurface) {
     }
 }
 
+// A channel with an upright and a slanted side: a flat that may cut it at once follows the upright side once,
+// and terraces the other; one that cuts in steps as fine as the stairs goes along both at every step.
+TEST(RestContours, SemiRoughingGoesAsDeepAsItsCutterAndTerracesSlopes) {
+    std::vector<double> length, left, deepest;
+    for (const double step : {1.0, 5.0, kTop}) {
+        Notch n;
+        n.mesh = test::height_field(n.context, 60, 1, [](double x, double y) {
+            const double side = y > 0 ? 1.5 * (y - 5) : (-y - 5) * 100, end = (-12 - x) * 100;
+            return std::clamp(std::max(side, end), 0.5, kTop);
+        });
+        n.layer.mesh = n.mesh.view();
+        n.cut.solid = layer_solid(n.context, n.mesh.view(), 0, kTop);
+        n.cut.alpha = alpha_map(n.context, n.mesh.view(), 0, kTop);
+        Tool semi = n.flat(0.25);
+        semi.stepdown_min = 1;
+        semi.stepdown_max = step;
+        n.layer.tools.rough = n.flat(1);
+        LayerStock stock(n.cut.context, n.cut.layer, n.cut.solid, 0.25);
+        stock.cut(n.cut.context, rough_layer(n.cut).back(), n.layer.tools.rough);
+        const double before = stock.area_over(n.context, 1);
+        const Operation op = semi_rough_layer(n.cut, stock, semi, {"waste", 1.0, 0, 0.3});
+        double mm = 0;
+        for (std::size_t i = 1; i < op.moves.size(); ++i)
+            if (op.moves[i].feed > 0)
+                mm += std::hypot(to_mm(op.moves[i].x) - to_mm(op.moves[i - 1].x),
+                                 to_mm(op.moves[i].y) - to_mm(op.moves[i - 1].y));
+        length.push_back(mm);
+        left.push_back(stock.area_over(n.context, 1));
+        deepest.push_back(op.stepdown);
+        EXPECT_LT(left.back(), 0.2 * before) << step;
+    }
+    std::printf("steps of 1, 5, %.0f mm: %.0f, %.0f, %.0f mm of feed, %.0f, %.0f, %.0f mm2 left\n", kTop,
+                length[0], length[1], length[2], left[0], left[1], left[2]);
+    EXPECT_LE(deepest[1], 5 + 1e-9);
+    EXPECT_GT(deepest[2], 5);
+    EXPECT_LT(length[1], 0.8 * length[0]);
+    EXPECT_LT(length[2], 0.7 * length[0]);
+    for (const double mm2 : left) EXPECT_NEAR(mm2, left[0], 0.15 * left[0] + 5);
+}
+
+// Wider roughing cutters keep the whole range of their steps, and what they leave is for a much narrower one.
+TEST(RestContours, AMuchNarrowerFlatFollowsAWiderOne) {
+    int followed = 0;
+    for (const auto& library : {luo_library(), shop_library()}) {
+        Notch n;
+        n.job.tools = library;
+        for (const double finish : {0.5, 0.25}) {
+            LayerTools base = fixed_tools(n.job);
+            base.finish = n.tool(ToolKind::ball, finish);
+            for (const LayerTools& set : with_wider_rough(n.cut.context, n.layer, base)) {
+                const Tool own = n.flat(set.rough.diameter / kInch);
+                EXPECT_EQ(set.rough.stepdown_min, own.stepdown_min);
+                EXPECT_EQ(set.rough.stepdown_max, own.stepdown_max);
+                for (const Tool& semi : set.semi_rough) {
+                    ++followed;
+                    EXPECT_LE(semi.diameter, 0.7 * set.rough.diameter);
+                    EXPECT_GE(semi.diameter, 0.5 * base.finish.diameter);
+                    for (const Tool& tool : library)
+                        if (tool.kind == ToolKind::flat && tool.diameter > semi.diameter + 1e-9) {
+                            EXPECT_GT(tool.diameter, 0.7 * set.rough.diameter) << "would follow sooner";
+                        }
+                }
+            }
+        }
+    }
+    EXPECT_GE(followed, 3);
+}
+
 TEST(RestContours, AWiderSwathLeavesLessToSemiRoughing) {
     std::vector<double> length;
     for (const double swath : {0.5, 2.0, 4.0, 8.5}) {

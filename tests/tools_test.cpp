@@ -97,7 +97,7 @@ TEST(Tools, TheShopsLibraries) {
         for (const Tool& printed : luo)
             if (tool.kind == printed.kind && std::abs(tool.diameter - printed.diameter) < 1e-9) {
                 EXPECT_EQ(tool.stepdown_min, printed.stepdown_min) << tool.name;
-                if (tool.kind != ToolKind::flat || tool.diameter < 4) {
+                if (tool.diameter < 4 || (tool.kind == ToolKind::ball && tool.diameter < 12)) {
                     EXPECT_EQ(tool.stepdown_max, printed.stepdown_max) << tool.name;
                 }
             }
@@ -129,6 +129,10 @@ TEST(Tools, FlatsOfTheShopGoAsDeepAsPublishedChipLoadsAllow) {
             ++charted;
         }
     EXPECT_EQ(charted, 6);
+    for (const std::vector<Tool>& tools : {shop_library(), metric_library()})
+        for (const Tool& tool : tools)
+            if (tool.kind == ToolKind::ball)
+                EXPECT_NEAR(tool.stepdown_max, tool.diameter / 2, 1e-12) << tool.name;
 }
 
 TEST(Tools, LevelsAreEvenDownToEveryFloor) {

@@ -156,7 +156,7 @@ RoughSteps rough_steps(const Job& job, const Tool& tool, double overhang_mm, dou
                (usual ? layer_mm : count * last + step);
     };
     for (int levels = 1; levels <= finest; ++levels)
-        for (int count = std::min(most, levels - 1); count >= std::min(1, most); --count) {
+        for (int count = std::min(most, levels - 1); count >= 0; --count) {
             const double step = (layer_mm - count * last) / (levels - count);
             if (step >= least && step <= tool.stepdown_max + 1e-9 && holds(step, count))
                 return {last, count, step};

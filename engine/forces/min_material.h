@@ -25,10 +25,10 @@ namespace slabwright {
 /// levels are shallow, so that the last one cuts through no more than a sliver that tears off (least_slab),
 /// for a slab as thin as a whole step would bend; the others are even and no finer than the tool is made for,
 /// and the layer bears their cuts two thirds as far out, for roughing seldom meets the hardest cut, which
-/// this is reckoned by. Only the last level is shallow where that makes a level fewer, and what is over it
-/// bears the lowest of the others three quarters as far out. Where there are no such steps all are shallow,
-/// and where the layer would not bear them even half as far out the last two are as the others: what breaks
-/// there breaks anyway.
+/// this is reckoned by. Only the last level is shallow, or none is, where that makes a level fewer, and what
+/// stands where the lowest of the others is cut bears that three quarters as far out. Where there are no such
+/// steps all are shallow, and where the layer would not bear them even half as far out the last two are as
+/// the others: what breaks there breaks anyway.
 /// @param layer_mm its height
 /// @throws Error(usage, "forces.segment") as least_material
 [[nodiscard]] RoughSteps rough_steps(const Job& job, const Tool& tool, double overhang_mm, double layer_mm);

@@ -200,8 +200,8 @@ private:
     }
 
     // All sets from `begin` on clear the waste; what then follows is alike, and only the first to be there
-    // goes on. A narrower roughing cutter leaves less to corners: where these take longer than it was behind
-    // it is planned, too.
+    // goes on. One narrower than all cutters that cleared it leaves less to corners: where these take longer
+    // than it was behind it is planned, too.
     void finish_the_first(std::size_t begin, double from, double cleared_at, double to) {
         if (begin == sets_.size()) return;
         std::optional<LayerPaths> leading;
@@ -237,8 +237,14 @@ private:
         for (std::size_t s = begin; s < sets_.size(); ++s) {
             NamedSet& set = sets_[s];
             if (s == leader) continue;
-            if (cleared[s] > 0 && set.tools.rough.diameter < sets_[leader].tools.rough.diameter &&
-                cleared[s] - cleared[leader] < corners) {
+            // One no narrower than the last of these leaves less beside walls at most: worth a trial where
+            // corners take a minute more than it was behind.
+            constexpr double kWorthATrial = 1;  // min
+            const LayerTools& led = sets_[leader].tools;
+            const double gain = set.tools.rough.diameter < narrowest_rough(led) ? corners
+                                : set.tools.rough.diameter < led.rough.diameter ? corners - kWorthATrial
+                                                                                : 0;
+            if (cleared[s] > 0 && cleared[s] - cleared[leader] < gain) {
                 ProgressPart none(progress_, to, to);
                 try_set(s, none, PaceAhead{}.times);
             } else {
@@ -254,6 +260,12 @@ private:
                               set.record.minutes, leader + 1, cleared[leader]);
             }
         }
+    }
+    // mm, of the cutters that clear waste before the finish tool does.
+    static double narrowest_rough(const LayerTools& tools) {
+        double narrowest = tools.rough.diameter;
+        for (const Tool& semi : tools.semi_rough) narrowest = std::min(narrowest, semi.diameter);
+        return narrowest;
     }
     // Of the best set.
     [[nodiscard]] double corner_minutes() const {

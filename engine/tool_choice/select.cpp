@@ -99,10 +99,13 @@ public:
         const double height = layer_.z_top - layer_.z_bottom, swath = base.finish.diameter;
         const double allowed = std::min(
             flat_level_stepdown(slopes_of(context_, layer_).least, base.finish.diameter / 2), height);
-        for (Tool rough : flats_) {
+        // Their stairs are of that; what they cut between these has room for all that they take at once.
+        const auto step_of = [&](const Tool& flat) {
+            return std::clamp(allowed, std::min(flat.stepdown_min, height), flat.stepdown_max);
+        };
+        for (const Tool& rough : flats_) {
             if (rough.diameter < base.rough.diameter - 1e-9) break;
-            const double step = std::clamp(allowed, std::min(rough.stepdown_min, height), rough.stepdown_max);
-            rough.stepdown_min = step;       // of terraces, between levels as deep as the tool may cut
+            constexpr double kMuchNarrower = 0.7;
             constexpr double kDeeper = 1.2;  // times as deep: less hardly makes a level fewer
             if (rough.diameter <= base.rough.diameter + 1e-9 &&
                 rough.stepdown_max < kDeeper * base.rough.stepdown_max)
@@ -111,16 +114,12 @@ public:
             tools.finish = base.finish;
             tools.rough = rough;
             tools.rest = rest_tools(job_, rough, base.finish.diameter);
-            if (left(rough, step, swath).nothing(job_.selection.voxel)) continue;
-            for (Tool semi : flats_) {
-                if (semi.diameter >= rough.diameter - 1e-9) continue;
-                if (semi.diameter < base.finish.diameter / 2 - 1e-9) break;
-                semi.stepdown_max =
-                    std::clamp(allowed, std::min(semi.stepdown_min, height), semi.stepdown_max);
-                semi.stepdown_min = std::min(semi.stepdown_min, semi.stepdown_max);
-                tools.semi_rough = {semi};
-                if (left(semi, semi.stepdown_max, swath).nothing(job_.selection.voxel)) break;
-            }
+            if (left(rough, step_of(rough), swath).nothing(job_.selection.voxel)) continue;
+            const auto semi = std::find_if(flats_.begin(), flats_.end(), [&](const Tool& flat) {
+                return flat.diameter <= kMuchNarrower * rough.diameter;
+            });
+            if (semi != flats_.end() && semi->diameter >= base.finish.diameter / 2 - 1e-9)
+                tools.semi_rough = {*semi};
         }
         return sets;
     }

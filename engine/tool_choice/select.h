@@ -46,9 +46,9 @@ struct Overrun {
 [[nodiscard]] ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio = {});
 
 /// Past print: sets with the same finish tool whose roughing cutter is wider, or as wide and goes deeper, the
-/// widest first; each as deep at once as the finish tool's radius allows at the least slope. What these leave
-/// outside the finish tool's swath is for the largest smaller flat that leaves nothing there; where none
-/// does, for the smallest one wider than the finish tool's half.
+/// widest first. Where one leaves something outside the finish tool's swath, with stairs no higher than that
+/// one's radius allows at the least slope, a narrower flat follows: the widest of at most .7 of its width,
+/// unless the finish tool is more than twice as wide.
 /// @param layer as above
 [[nodiscard]] std::vector<LayerTools> with_wider_rough(Context& context, const LayerJob& layer,
                                                        const LayerTools& tools);

@@ -46,6 +46,8 @@ void make_of_carbide(std::span<Tool> tools) {
 /// less two deep, .3 mm for 1/4 in one deep, and nothing wider; of 1/8 in they have .1 mm, so it stays at
 /// LUO's depth.
 constexpr double kWholeDepth = 1, kHalfDepth = 2, kQuarterDepth = 1;
+/// And balls, as LUO's of 1/4 and 1/8 in do.
+constexpr double kBallDepth = 0.5;
 
 /// A row of LUO table 5.4, inches: the diameter, and the range of its stepdown.
 struct LuoRow {
@@ -102,7 +104,7 @@ std::vector<Tool> shop_library() {
     tools.push_back(
         end_mill(5, ToolKind::flat, up_to(in_inches("1/4 in", kQuarter, kInch, 38, 32), kQuarterDepth)));
     tools.push_back(end_mill(6, ToolKind::flat, eighth));
-    tools.push_back(end_mill(7, ToolKind::ball, in_inches("1/2 in", kHalf, 32, 50, 40)));
+    tools.push_back(end_mill(7, ToolKind::ball, up_to(in_inches("1/2 in", kHalf, 32, 50, 40), kBallDepth)));
     tools.push_back(end_mill(8, ToolKind::ball, eighth));
     make_of_carbide(tools);
     return tools;
@@ -141,7 +143,7 @@ std::vector<Tool> metric_library() {
     tools.push_back(end_mill(4, ToolKind::flat, up_to(in_mm("25 mm", 25, kWhole, 50, 75, 50), kWholeDepth)));
     tools.push_back(end_mill(5, ToolKind::flat, up_to(six, kQuarterDepth)));
     tools.push_back(end_mill(6, ToolKind::flat, three));
-    tools.push_back(end_mill(7, ToolKind::ball, twelve));
+    tools.push_back(end_mill(7, ToolKind::ball, up_to(twelve, kBallDepth)));
     tools.push_back(end_mill(8, ToolKind::ball, three));
     make_of_carbide(tools);
     return tools;

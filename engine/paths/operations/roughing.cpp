@@ -96,35 +96,11 @@ std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool, doub
     return stepped(cut, tool, floor, cut.layer.z_top, fixed_levels(cut, tool, floor), cusp);
 }
 
-namespace {
-
-// A level, and what has been cleared when it is cut.
-struct RoughStep {
-    RoughLevel level;
-    double above = 0;  // mm: what stands there stands this high
-    std::size_t floor =
-        0;  // of a terrace: the step that has cleared what is free at a lower height; of others: itself
-};
-
-// Every level clears all that is free at its height.
-std::vector<RoughStep> level_steps(const LayerCut& cut, const Tool& tool, double floor) {
-    std::vector<RoughStep> steps;
-    double above = cut.layer.z_top;
-    for (const RoughLevel& level : rough_levels(cut, tool, floor, cut.job.tolerances.rough_cusp)) {
-        steps.push_back({level, above, steps.size()});
-        above = level.tip;
-    }
-    return steps;
-}
-
-// Even levels, as deep as the tool may cut (but see RoughSteps), and over each of them terraces
-// where stepped() puts levels, from below: what is cut there are only the slopes and floors that the level
-// has left standing.
-std::vector<RoughStep> terraced_steps(const LayerCut& cut, const Tool& tool, double floor) {
+std::vector<RoughStep> terraced_steps(const LayerCut& cut, const Tool& tool, double floor, double cusp,
+                                      const RoughSteps& wood) {
     const std::vector<RoughLevel> fixed = fixed_levels(cut, tool, floor);
     const double top = cut.layer.z_top, bottom = cut.layer.z_bottom;
     std::vector<double> tips{bottom};
-    const RoughSteps& wood = cut.layer.rough_steps;
     for (int k = 0; k < wood.last_count && top - tips.back() > 1.5 * wood.last; ++k)
         tips.push_back(tips.back() + wood.last);
     const double rest = top - tips.back();
@@ -139,11 +115,23 @@ std::vector<RoughStep> terraced_steps(const LayerCut& cut, const Tool& tool, dou
         for (const RoughLevel& f : fixed)
             if (f.tip < above - 1e-3 && f.tip > z + 1e-3) between.push_back(f);
         between.push_back({z, std::max(bottom, z - floor)});
-        const std::vector<RoughLevel> levels =
-            stepped(cut, tool, floor, above, between, cut.job.tolerances.rough_cusp);
+        const std::vector<RoughLevel> levels = stepped(cut, tool, floor, above, between, cusp);
         const std::size_t lowest = steps.size();
         for (std::size_t i = levels.size(); i-- > 0;) steps.push_back({levels[i], above, lowest});
         above = z;
+    }
+    return steps;
+}
+
+namespace {
+
+// Every level clears all that is free at its height.
+std::vector<RoughStep> level_steps(const LayerCut& cut, const Tool& tool, double floor) {
+    std::vector<RoughStep> steps;
+    double above = cut.layer.z_top;
+    for (const RoughLevel& level : rough_levels(cut, tool, floor, cut.job.tolerances.rough_cusp)) {
+        steps.push_back({level, above, steps.size()});
+        above = level.tip;
     }
     return steps;
 }
@@ -168,7 +156,8 @@ public:
           cutter_(flat_cutter(r_ + kept_off_walls(cut.job.cutting))),
           op_(cut.operation(OperationKind::rough, contour_ ? "contour-parallel levels" : "zigzag levels",
                             tool_)),
-          steps_(contour_ ? terraced_steps(cut, tool_, cut.job.cutting.floor_allowance)
+          steps_(contour_ ? terraced_steps(cut, tool_, cut.job.cutting.floor_allowance,
+                                           cut.job.tolerances.rough_cusp, cut.layer.rough_steps)
                           : level_steps(cut, tool_, cut.job.cutting.floor_allowance)),
           last_(steps_.back().floor) {
         op_.blend = rough_blend(cut.job);

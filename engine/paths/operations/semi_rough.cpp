@@ -151,11 +151,8 @@ public:
         const std::array<std::pair<const DropIndex*, double>, 1> wider{
             std::pair{&cut_.drops(flat_cutter(rough.diameter / 2)), rough.diameter / 2}};
         std::vector<std::vector<LevelRun>> runs;
-        double above = cut_.layer.z_top;
         for (std::size_t i = 0; i < tips.size(); ++i) {
             cut_.context.throw_if_cancelled();
-            const double depth = above - tips[i];
-            above = tips[i];
             if (!wanted[i]) continue;
             targets.mark(tip_over(tips[i]), tip_over(levels[i].over));
             if (targets.cells().empty()) continue;
@@ -169,7 +166,7 @@ public:
             const std::size_t first = runs.size();
             cut_rings(targets, border, tips[i], allowance > 0, runs);
             if (runs.size() == first) continue;
-            op.stepdown = std::max(op.stepdown, ball_ ? tool_.stepdown_max : depth);
+            op.stepdown = std::max(op.stepdown, ball_ ? tool_.stepdown_max : levels[i].down);
             op.stepover = step();
             if (floor) append_foot_runs(cut_, tool_, tips[i], grid, wider, runs);
         }
@@ -182,17 +179,18 @@ public:
 private:
     struct Level {
         double tip = 0,
-               over = -kUnbounded;  // mm: what lies over a surface that is no higher than `over` is left to
+               over = -kUnbounded,  // mm: what lies over a surface that is no higher than `over` is left to
                                     // other levels
+            down = 0;               // mm that the tip may go down at once
     };
-    // In the order in which they are cut. A flat end mill's lie on floors too, and no closer than the stairs
-    // that they leave on slopes are a reason to go there. Between two of a ball's lie others, for the waste
+    // In the order in which they are cut. A flat end mill's terraces are no closer than the stairs that they
+    // leave on slopes are a reason to go there. Between two of a ball's lie others, for the waste
     // that does not reach down to the next.
     [[nodiscard]] std::vector<Level> levels_of() const {
         std::vector<Level> levels;
         if (!ball_) {
-            for (const RoughLevel& l : rough_levels(cut_, tool_, 0, pass_.limit / 2))
-                levels.push_back({l.tip});
+            for (const RoughStep& step : terraced_steps(cut_, tool_, 0, pass_.limit / 2, {}))
+                levels.push_back({step.level.tip, -kUnbounded, step.above - step.level.tip});
             return levels;
         }
         // As far below the layer as its rings leave ridges between them, so that none stays there as a film

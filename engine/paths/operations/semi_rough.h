@@ -16,10 +16,10 @@ struct SemiRoughPass {
 };
 
 /// Rings around what must stay, the farthest first, of which only those stretches are kept that cut something
-/// worth a visit. A flat end mill's levels lie on floors, on the layer's bottom, and as deep between them as
-/// its stepdown; a ball's at even steps down to the bottom, with others between them for what does not reach
-/// down to the next, and one below it, as far as that may be cut into, for walls that go on there. The
-/// allowance of a ball is kept along the normal. Takes what it cuts off the stock.
+/// worth a visit. A flat end mill's levels are those of terraced_steps(); a ball's at even steps down to the
+/// bottom, with others between them for what does not reach down to the next, and one below it, as far as
+/// that may be cut into, for walls that go on there. The allowance of a ball is kept along the normal. Takes
+/// what it cuts off the stock.
 [[nodiscard]] Operation semi_rough_layer(const LayerCut& cut, LayerStock& stock, const Tool& tool,
                                          const SemiRoughPass& pass);
 
