@@ -43,10 +43,22 @@ struct Rates {
     double thin = 13.93;  // thin walls are spared by feed and by passes
     double place = 2.441;  // min
     double turn = 0.0259;  // min a radian: machines slow down where an outline turns
+    double small = 0;      // min, of a layer's radians to the power of kManyTurns
 };
-/// Chosen tools clear wider, and reach into narrow places and between thin walls, which the fixed set leaves:
-/// so many times its minutes, fitted likewise to plans with the shop's tools.
-constexpr double kChosen = 0.918, kChosenNarrow = 2.076;
+/// Of chosen tools, which clear deeper and reach into small corners, fitted likewise to plans with the
+/// shop's.
+constexpr Rates kChosen{.facing = 1.761,
+                        .roughing = 3.231,
+                        .contours = 0.722,
+                        .raster = 3.394,
+                        .narrow = 76.2,
+                        .thin = 72.97,
+                        .place = 0.776,
+                        .turn = 0,
+                        .small = 1.062};
+/// What corners leave to smaller tools takes a change and a way of its own in each layer, and grows more
+/// slowly than the turns of its outlines do.
+constexpr double kManyTurns = 0.3;
 
 constexpr double kSmallPlace = 150;  // mm: a loop so long counts as half a place
 constexpr double kSeenTurn = 0.03;   // mm from a loop's chords, within which it may turn
@@ -58,23 +70,16 @@ constexpr double kBelow = 0.8;
 constexpr double kThin = 8;          // mm: walls that are thinner count
 constexpr double kSeenWidth = 0.05;  // mm, to which widths of wood and air are measured
 
-Rates rates_of(const Job& job) {
-    Rates rates;
-    if (!selects_tools(job)) return rates;
-    for (double Rates::*const rate :
-         {&Rates::facing, &Rates::roughing, &Rates::contours, &Rates::raster, &Rates::place, &Rates::turn})
-        rates.*rate *= kChosen;
-    for (double Rates::*const rate : {&Rates::narrow, &Rates::thin}) rates.*rate *= kChosenNarrow;
-    return rates;
-}
+Rates rates_of(const Job& job) { return selects_tools(job) ? kChosen : Rates{}; }
 
 /// Ways of one kind in all layers, mm.
 struct Ways {
     double facing = 0, roughing = 0, contours = 0, raster = 0;
     double places = 0;  ///< loops of sections, small ones by their length
     double turns = 0;   ///< rad by which outlines turn back, over all levels
+    double small = 0;   ///< of that in each layer the power kManyTurns
     double thin = 0;    ///< mm along walls thinner than kThin, over all levels
-    double narrow = 0;  ///< mm of roughing where the face mill does not fit
+    double narrow = 0;  ///< mm of roughing where clearing_tool() does not fit
 };
 
 const Tool& face_mill(const Job& job) {
@@ -83,12 +88,35 @@ const Tool& face_mill(const Job& job) {
     throw Error(ErrorKind::usage, "job.tool", "the library has no face mill", "tool", "give one");
 }
 
+/// What clears what lies open: the face mill, or of chosen tools the widest roughing cutter, which cuts
+/// deeper.
+const Tool& clearing_tool(const Job& job, const Tool& face) {
+    if (!selects_tools(job)) return face;
+    const Tool* widest = nullptr;
+    for (const Tool& tool : job.tools)
+        if (roughs_layers(tool.kind) && (widest == nullptr || tool.diameter > widest->diameter))
+            widest = &tool;
+    return widest != nullptr ? *widest : face;
+}
+
 /// mm, to which the rates are fitted: LUO's for 1/2 in. Deeper cuts leave terraces and shallow last levels.
 constexpr double kDeepest = 0.15 * kInch;
 
 /// mm³ that a tool takes away over a millimetre of clearing.
 double swath(const Tool& tool) {
     return tool.diameter * tool.stepover * std::min(tool.stepdown_max, kDeepest);
+}
+
+/// mm that clear so much of a layer: with chosen tools of the flat whose way is the shortest, in levels as
+/// deep as it may cut; else as the rate of roughing is fitted, by the volume.
+double clearing_way(const Job& job, const LayerTools& tools, double mm2, double height) {
+    if (!selects_tools(job)) return mm2 * height / swath(tools.rough);
+    double least = std::numeric_limits<double>::infinity();
+    for (const Tool& tool : job.tools)
+        if (roughs_layers(tool.kind))
+            least = std::min(
+                least, mm2 * std::ceil(height / tool.stepdown_max - 1e-9) / (tool.diameter * tool.stepover));
+    return least;
 }
 
 double perimeter(std::span<const Point2> loop) {
@@ -132,7 +160,7 @@ struct SectionCount {
 };
 
 /// @param height mm, of the part of a layer that it stands for
-SectionCount count_section(const Loops& section, double height, const LayerTools& tools, const Tool& face) {
+SectionCount count_section(const Loops& section, double height, const LayerTools& tools, const Tool& wide) {
     const Loops solid = simplify(section);
     SectionCount ways{.mm2 = area(solid)};
     for (std::size_t i = 0; i < solid.size(); ++i) {
@@ -144,7 +172,7 @@ SectionCount count_section(const Loops& section, double height, const LayerTools
     for (std::size_t i = 0; i < coarse.size(); ++i) ways.turns += levels * turning_back(coarse.loop(i));
     const Loops seen = thinned(solid, kSeenWidth);
     ways.thin = levels * thin_area(seen, kThin) / kThin;
-    ways.narrow = height * narrow_area(seen, face.diameter) / swath(tools.rough);
+    ways.narrow = height * narrow_area(seen, wide.diameter) / swath(tools.rough);
     return ways;
 }
 
@@ -237,7 +265,7 @@ void add_surface(Context& context, MeshView mesh, const Job& job, const LayerToo
 /// @param tops of the plan's layers, mm
 std::vector<SectionCount> count_sections(Context& context, MeshView mesh, const Plan& plan,
                                          const std::vector<double>& tops, const LayerTools& tools,
-                                         const Tool& face) {
+                                         const Tool& wide) {
     std::vector<Plane> planes;
     double bottom = 0;
     for (const double top : tops) {
@@ -251,7 +279,7 @@ std::vector<SectionCount> count_sections(Context& context, MeshView mesh, const 
     std::vector<SectionCount> counts(sections.size());
     parallel_each(context, sections.size(), [&](std::size_t i) {
         const Layer& layer = plan.layers[i / 3];
-        counts[i] = count_section(sections[i].loops, (layer.z_top - layer.z_bottom) / 3, tools, face);
+        counts[i] = count_section(sections[i].loops, (layer.z_top - layer.z_bottom) / 3, tools, wide);
     });
     return counts;
 }
@@ -269,8 +297,10 @@ double changes_of(const Machine& machine) {
     return probed ? kChanges + 1 : kChanges;
 }
 
-/// Adds what sections count.
+/// Adds what sections count, three of each layer.
 void add_counts(std::span<const SectionCount> counts, Ways& ways) {
+    for (std::size_t k = 0; k + 2 < counts.size(); k += 3)
+        ways.small += std::pow(counts[k].turns + counts[k + 1].turns + counts[k + 2].turns, kManyTurns);
     for (const SectionCount& count : counts) {
         ways.places += count.places;
         ways.turns += count.turns;
@@ -296,18 +326,18 @@ public:
         : context_(context), mesh_(mesh), plan_(plan) {}
 
     /// @returns how many there are
-    int add(const std::vector<MilledLayer>& milled, const LayerTools& tools, const Tool& face, Ways& ways) {
+    int add(const std::vector<MilledLayer>& milled, const LayerTools& tools, const Tool& wide, Ways& ways) {
         int count = 0;
         for (std::size_t l = 0; l < milled.size(); ++l) {
             if (milled[l].milled != MilledFrom::both_sides) continue;
             ++count;
-            add(turned_slab(plan_, plan_.layers[l], milled[l].web), tools, face, ways);
+            add(turned_slab(plan_, plan_.layers[l], milled[l].web), tools, wide, ways);
         }
         return count;
     }
 
 private:
-    void add(const TurnedSlab& slab, const LayerTools& tools, const Tool& face, Ways& ways) {
+    void add(const TurnedSlab& slab, const LayerTools& tools, const Tool& wide, Ways& ways) {
         const Mesh target = underside_target(context_, mesh_, slab);
         const double floor = recess_floor(slab), top = slab.slab_thickness, height = top - floor;
         const double beside = std::min(kBeside, height / 4);
@@ -316,12 +346,13 @@ private:
         const std::vector<Section> sections = slice(context_, target.view(), planes);
         std::array<SectionCount, 3> counts;
         parallel_each(context_, counts.size(), [&](std::size_t k) {
-            counts[k] = count_section(sections[k].loops, height / 3, tools, face);
+            counts[k] = count_section(sections[k].loops, height / 3, tools, wide);
         });
         add_counts(counts, ways);
         const Box3 tray = bounds(context_, target.view());
         const double whole = (double{tray.max.x} - tray.min.x) * (double{tray.max.y} - tray.min.y);
-        ways.roughing += std::max(0.0, whole - mean_area(filled_areas(counts))) * height / swath(tools.rough);
+        ways.roughing +=
+            clearing_way(plan_.job, tools, std::max(0.0, whole - mean_area(filled_areas(counts))), height);
         add_surface(context_, target.view(), plan_.job, tools, {floor, top}, ways);
     }
 
@@ -377,7 +408,7 @@ void reckon_layers(const Plan& plan, const Box3& box, std::span<const SectionCou
         const double takes = slab * together - height;
         ways.facing += std::ceil(std::max(takes, 1e-3) / face.stepdown_max) * stock_mm2 /
                        (face.diameter * face.stepover);
-        ways.roughing += std::max(0.0, stock_mm2 - mean_area(area_at)) * height / swath(tools.rough);
+        ways.roughing += clearing_way(plan.job, tools, std::max(0.0, stock_mm2 - mean_area(area_at)), height);
         const double below = l == 0 ? area_at[0] : counts[3 * l - 1].mm2;
         const double glued = std::min(area_at[0], below);
         result.glue_m2 += glued * 1e-6;
@@ -403,7 +434,7 @@ std::vector<QuotedWork> work_of(const Ways& ways, const LayerTools& tools, const
     work("thin walls", ways.thin, tools.finish, rates.thin);
     work("narrow places", ways.narrow, tools.rough, rates.narrow);
     found.push_back({"places", ways.places, rates.place * ways.places});
-    found.push_back({"turns", 0, rates.turn * ways.turns});
+    found.push_back({"turns", 0, rates.turn * ways.turns + rates.small * ways.small});
     return found;
 }
 
@@ -424,7 +455,7 @@ Quote quote(Context& context, MeshView mesh, const Job& asked) {
     const QuotedLayers found = quoted_layers(context, mesh, job);
     const std::vector<double>& tops = found.layers.tops;
     const LayerTools tools = fixed_tools(job);
-    const Tool& face = face_mill(job);
+    const Tool &face = face_mill(job), &wide = clearing_tool(job, face);
     const Rates rates = rates_of(job);
     Quote result;
     result.outcome = found.layers.lying;
@@ -433,7 +464,7 @@ Quote quote(Context& context, MeshView mesh, const Job& asked) {
     saw_blanks(context, mesh, plan);
     result.boards = cut_list(plan);
 
-    const std::vector<SectionCount> counts = count_sections(context, mesh, plan, tops, tools, face);
+    const std::vector<SectionCount> counts = count_sections(context, mesh, plan, tops, tools, wide);
     Ways ways, below;
     add_counts(counts, ways);
     reckon_layers(plan, box, counts, tools, face, result, ways);
@@ -441,7 +472,7 @@ Quote quote(Context& context, MeshView mesh, const Job& asked) {
     if (found.gaps) {
         const std::vector<MilledLayer> milled = milled_layers(context, plan, mesh, *found.gaps);
         tell_unmade(unmade_air(context, *found.gaps, milled), job.tolerances.undercut, result.outcome);
-        result.undersides = Undersides(context, mesh, plan).add(milled, tools, face, below);
+        result.undersides = Undersides(context, mesh, plan).add(milled, tools, wide, below);
     }
     result.work = work_of(ways, tools, face, rates, job.machine);
     result.cutting_minutes = minutes_of(result.work);
