@@ -237,8 +237,8 @@ private:
         for (std::size_t s = begin; s < sets_.size(); ++s) {
             NamedSet& set = sets_[s];
             if (s == leader) continue;
-            // One no narrower than the last of these leaves less beside walls at most: worth a trial where
-            // corners take a minute more than it was behind.
+            // One as wide as the narrowest of these reaches the same corners and only leaves less beside
+            // walls: worth a trial where corners take a minute more than it was behind.
             constexpr double kWorthATrial = 1;  // min
             const LayerTools& led = sets_[leader].tools;
             const double gain = set.tools.rough.diameter < narrowest_rough(led) ? corners

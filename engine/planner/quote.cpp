@@ -100,7 +100,7 @@ const Tool& clearing_tool(const Job& job, const Tool& face) {
     return widest != nullptr ? *widest : face;
 }
 
-/// mm, to which the rates are fitted: LUO's for 1/2 in. Deeper cuts leave terraces and shallow last levels.
+/// mm, to which rates of a volume are fitted: LUO's for 1/2 in.
 constexpr double kDeepest = 0.15 * kInch;
 
 /// mm³ that a tool takes away over a millimetre of clearing.

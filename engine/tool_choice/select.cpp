@@ -99,10 +99,6 @@ public:
         const double height = layer_.z_top - layer_.z_bottom, swath = base.finish.diameter;
         const double allowed = std::min(
             flat_level_stepdown(slopes_of(context_, layer_).least, base.finish.diameter / 2), height);
-        // Their stairs are of that; what they cut between these has room for all that they take at once.
-        const auto step_of = [&](const Tool& flat) {
-            return std::clamp(allowed, std::min(flat.stepdown_min, height), flat.stepdown_max);
-        };
         for (const Tool& rough : flats_) {
             if (rough.diameter < base.rough.diameter - 1e-9) break;
             constexpr double kMuchNarrower = 0.7;
@@ -114,7 +110,10 @@ public:
             tools.finish = base.finish;
             tools.rough = rough;
             tools.rest = rest_tools(job_, rough, base.finish.diameter);
-            if (left(rough, step_of(rough), swath).nothing(job_.selection.voxel)) continue;
+            // What it leaves is asked for with stairs as high as the finish tool may follow.
+            const double stairs =
+                std::clamp(allowed, std::min(rough.stepdown_min, height), rough.stepdown_max);
+            if (left(rough, stairs, swath).nothing(job_.selection.voxel)) continue;
             const auto semi = std::find_if(flats_.begin(), flats_.end(), [&](const Tool& flat) {
                 return flat.diameter <= kMuchNarrower * rough.diameter;
             });

@@ -190,7 +190,7 @@ private:
         std::vector<Level> levels;
         if (!ball_) {
             for (const RoughStep& step : terraced_steps(cut_, tool_, 0, pass_.limit / 2, {}))
-                levels.push_back({step.level.tip, -kUnbounded, step.above - step.level.tip});
+                levels.push_back({.tip = step.level.tip, .down = step.above - step.level.tip});
             return levels;
         }
         // As far below the layer as its rings leave ridges between them, so that none stays there as a film
