@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <queue>
 #include <random>
 #include <tuple>
@@ -83,12 +84,13 @@ TEST(Loose, FromTheMiddleOutwardsNothingFalls) {
     EXPECT_TRUE(cover.run().empty());
 }
 
-TEST(Loose, WhatIsGluedBelowIsHeld) {
+TEST(Loose, WhatStandsGluedInTheMiddleHolds) {
     Cover cover;
-    cover.slab.glued = rectangle(25, 25, 35, 35);
+    const Loops frame = cover.slab.kept;
+    cover.slab.kept = unite(frame, rectangle(25, 25, 35, 35));
     cover.ring(14, 10);
     EXPECT_TRUE(cover.run().empty());
-    cover.slab.glued = {};
+    cover.slab.kept = frame;
     const auto pieces = cover.run();
     ASSERT_EQ(pieces.size(), 1U);
     EXPECT_NEAR(pieces[0].thickness_mm, 10, 1e-9) << "nothing ever cut it";
@@ -109,7 +111,7 @@ TEST(Loose, AgreesWithFillingAfterEveryMove) {
             slab.kept = unite(slab.kept, rectangle(x, y, x + 4, y + 4));
         }
         const double gx = at() + 0.03, gy = at() + 0.03;
-        slab.glued = rectangle(gx, gy, gx + 6, gy + 6);
+        slab.kept = unite(slab.kept, rectangle(gx, gy, gx + 6, gy + 6));
         Tool tool;
         tool.number = 1, tool.diameter = 3.0137;  // no border through the middle of a cell either
         Operation op;
@@ -133,8 +135,7 @@ TEST(Loose, AgreesWithFillingAfterEveryMove) {
                 for (int i = 0; i < 40; ++i) {
                     const Point2 p{to_units(grid.x(i)), to_units(grid.y(j))};
                     const std::size_t c = grid.index(i, j);
-                    if (there[c] && (winding(slab.kept, p) > 0 || winding(slab.glued, p) > 0))
-                        held[c] = 1, open.push(c);
+                    if (there[c] && winding(slab.kept, p) > 0) held[c] = 1, open.push(c);
                 }
             auto spread = [&](std::queue<std::size_t>& queue, std::vector<char>& mark) {
                 std::size_t count = 0;
@@ -276,6 +277,71 @@ TEST(Loose, AFaceMillsRingsCloseBesideWhatIsClear) {
                 EXPECT_FALSE(down && up) << op.purpose << ": down for nothing at " << to_mm(b.x) << " "
                                          << to_mm(b.y) << " " << to_mm(b.z);
             }
+        for (const Diagnostic& d : plan.diagnostics)
+            EXPECT_NE(d.code, "waste.loose") << seed << ": " << d.message;
+    }
+}
+
+Outline plan_view(double x0, double y0, double x1, double y1) {
+    const std::vector<Corner> corners{{x0, y0, 3}, {x1, y0, 3}, {x1, y1, 3}, {x0, y1, 3}};
+    return rounded_polygon(corners, 0.01);
+}
+
+// A table on two walls, between which a cone hangs down to 6 mm over the board: in layer 1 it stands by
+// itself, on wood that stays filled down to the board and is glued to it.
+TEST(Loose, WhatStaysFilledUnderAnOverhangIsGlued) {
+    std::vector<Facet> facets;
+    const Outline table = plan_view(0, 0, 200, 100);
+    const Ring under = ring(table, {0, 30}), over = ring(table, {0, 40});
+    std::vector<Ring> hanging;
+    for (const double x : {8.0, 172.0}) {
+        const Outline wall = plan_view(x, 10, x + 20, 90);
+        const Ring foot = ring(wall, {0, 0});
+        hanging.push_back(ring(wall, {0, 30}));
+        flat(facets, foot, {}, false);
+        strip(facets, foot, hanging.back());
+    }
+    const Ring rim = ring(circle(100, 50, 40, 0.05), {0, 30});
+    hanging.push_back(rim);
+    fan(facets, Ring(rim.rbegin(), rim.rend()), {100, 50, 6});
+    flat(facets, under, hanging, false);
+    strip(facets, under, over);
+    flat(facets, over, {}, true);
+    Context context;
+    Job job;
+    job.allow_undercut = true;
+    const Plan plan = make_plan(context, weld(context, facets), {}, job);
+    const Layer& first = plan.layers.front();
+    const double radius = 40.0 / 24 * (first.z_top - 6);  // of the cone where the layer ends
+    ASSERT_GT(radius, 5);
+    EXPECT_NEAR(first.joints.front().standing_mm2, 2 * 20 * 80 + std::numbers::pi * radius * radius, 30);
+    for (const Diagnostic& d : plan.diagnostics) EXPECT_NE(d.code, "waste.loose") << d.message;
+}
+
+// The flat that a boundary lies on is rough in its fourth decimal, as a mended mesh is. No glue is put on it,
+// and what roughing left over it would lie there by itself.
+TEST(Loose, WhatLiesOnTheBoundarysFlatIsRoughedAway) {
+    const std::uint32_t seed = test::seed();
+    std::mt19937 random(seed);
+    for (int round = 0; round < 3; ++round) {
+        const double x = static_cast<double>(random() % 100) - 100,
+                     y = static_cast<double>(random() % 100) - 50;
+        const Outline plate = plan_view(-150, -100, 150, 100), post = plan_view(x, y, x + 30, y + 30);
+        const Ring bottom = ring(plate, {0, 0}), edge = ring(plate, {0, 15}), foot = ring(post, {0, 15}),
+                   top = ring(post, {0, 30});
+        std::vector<Facet> facets;
+        flat(facets, bottom, {}, false);
+        strip(facets, bottom, edge);
+        flat(facets, edge, {foot}, true);
+        strip(facets, foot, top);
+        flat(facets, top, {}, true);
+        Context context;
+        Mesh mesh = weld(context, facets);
+        for (Vec3f& v : mesh.vertices)
+            if (v.z == 15) v.z += static_cast<float>(random() % 9) * 1e-4F;
+        const Plan plan = make_plan(context, mesh, {}, {});
+        ASSERT_EQ(plan.layers.size(), 2U);
+        for (const Operation& op : plan.layers[1].operations) EXPECT_NE(op.purpose, "floors") << seed;
         for (const Diagnostic& d : plan.diagnostics)
             EXPECT_NE(d.code, "waste.loose") << seed << ": " << d.message;
     }

@@ -27,6 +27,7 @@
 #include "engine/stock/layer_stock.h"
 #include "engine/stock/loose.h"
 #include "kernels/parallel/parallel.h"
+#include "kernels/slicing/silhouette.h"
 
 namespace slabwright {
 
@@ -132,13 +133,11 @@ Operation clear_between(const LayerCut& cut, LayerStock& stock, RestPass pass, d
 // Whatever the order of the cuts was meant to do: what comes loose is found from sections and moves alone.
 void report_loose(const LayerCut& cut, LayerResult& result) {
     const LayerJob& layer = cut.layer;
-    HeldSlab slab{layer.stock_min, layer.stock_max, layer.z_bottom, layer.z_top, {}, {}};
-    // Clearly beside the boundary, whose height is that of the vertices there but for rounding.
-    const std::array<Plane, 2> planes{Plane{layer.z_bottom + 10 * kTopSheet, Side::above},
-                                      Plane{layer.z_bottom - 10 * kTopSheet, Side::below}};
-    const std::vector<Section> sections = slice(cut.context, layer.mesh, planes, {cut.job.tolerances.gap});
-    slab.kept = simplify(sections[0].loops);
-    slab.glued = simplify(sections[1].loops);
+    // What stays filled under an overhang is kept, too, and where it has wood or the board under it, glued.
+    // It begins clearly beside the boundary, whose height is that of the vertices there but for rounding.
+    const HeightRange kept{layer.z_bottom + 10 * kTopSheet, layer.z_top - 2 * kTopSheet};
+    HeldSlab slab{layer.stock_min, layer.stock_max, layer.z_bottom, layer.z_top,
+                  shadows(cut.context, layer.mesh, {&kept, 1}).front()};
     if (!layer.opening.empty()) {
         slab.kept = unite(slab.kept, subtract(cut.stock_outline(), layer.opening));
     }
@@ -435,7 +434,7 @@ private:
         // On slopes what no ball reaches: creases, mostly nothing.
         for (const Tool& tool : tools_.rest)
             if (tool.kind == ToolKind::flat && last_of_kind(tool) && ball_follows(tool))
-                narrow_corners(stock, tool, limit, true);
+                where_worth(stock, limit, kNothing, [&] { narrow_corners(stock, tool, limit, true); });
         if (cut_.job.cutting.edges)
             for (Operation& op : follow_edges(cut_, stock)) take(std::move(op));
         result_.left_mm2 = stock.area_over(context_, limit);
@@ -449,24 +448,32 @@ private:
                        .on_slopes = on_slopes}));
     }
     static constexpr double kWorthAChange = 150;  // mm² left, for a tool between others
+    static constexpr double kNothing = 2;         // mm² in a layer that no tool is taken for
     void cut_narrow(LayerStock& stock, const Tool& tool, double limit) {
+        where_worth(stock, limit, last_of_kind(tool) ? kNothing : kWorthAChange, [&] {
+            if (contours_ && tool.kind == ToolKind::flat)
+                take(semi_rough_layer(cut_, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
+            else take(cut_rest(cut_, stock, tool, waste(tool, "waste in narrow places")));
+            if (tool.kind == ToolKind::flat) narrow_corners(stock, tool, limit, !ball_follows(tool));
+            else
+                take(cut_rest(cut_, stock, tool,
+                              {.kind = OperationKind::finish,
+                               .purpose = "what is left in narrow places",
+                               .limit = limit,
+                               .followed = followed(tool)}));
+        });
+    }
+    // Cuts where `worth` mm² and more are left over the limit, and takes the cuts back where they were for
+    // less: what a tool is for is only seen when it has cut.
+    template <class Cut>
+    void where_worth(LayerStock& stock, double limit, double worth, Cut&& cut) {
         const double left = stock.area_over(context_, limit);
-        if (!last_of_kind(tool) && left < kWorthAChange) return;
-        // What a tool between others is for is only seen when it has cut; where that is little it has not.
-        std::optional<Attempt> attempt;
+        if (left < worth) return;
         const std::size_t operations = result_.operations.size();
-        if (contours_ && !last_of_kind(tool)) attempt.emplace(cut_, stock);
-        if (contours_ && tool.kind == ToolKind::flat)
-            take(semi_rough_layer(cut_, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
-        else take(cut_rest(cut_, stock, tool, waste(tool, "waste in narrow places")));
-        if (tool.kind == ToolKind::flat) narrow_corners(stock, tool, limit, !ball_follows(tool));
-        else
-            take(cut_rest(cut_, stock, tool,
-                          {.kind = OperationKind::finish,
-                           .purpose = "what is left in narrow places",
-                           .limit = limit,
-                           .followed = followed(tool)}));
-        if (!attempt || left - stock.area_over(context_, limit) >= kWorthAChange) return;
+        std::optional<Attempt> attempt;
+        if (contours_) attempt.emplace(cut_, stock);
+        cut();
+        if (!attempt || left - stock.area_over(context_, limit) >= worth) return;
         attempt->undo();
         result_.operations.resize(operations);
     }

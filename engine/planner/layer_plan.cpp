@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <string>
 
@@ -204,17 +205,27 @@ private:
     // than it was behind it is planned, too.
     void finish_the_first(std::size_t begin, double from, double cleared_at, double to) {
         if (begin == sets_.size()) return;
+        // Wide cutters mostly win, and the sooner narrower ones are behind, the less is laid of them.
+        std::vector<std::size_t> order(sets_.size() - begin);
+        std::iota(order.begin(), order.end(), begin);
+        std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+            return std::pair(sets_[a].tools.rough.diameter, a) > std::pair(sets_[b].tools.rough.diameter, b);
+        });
         std::optional<LayerPaths> leading;
-        std::size_t leader = begin;
+        std::size_t leader = order.front();
         std::vector<double> cleared(sets_.size(), 0);  // minutes; 0: it fell behind
-        const double step = (cleared_at - from) / static_cast<double>(sets_.size() - begin);
-        for (std::size_t s = begin; s < sets_.size(); ++s) {
-            const double at = from + step * static_cast<double>(s - begin);
+        const double step = (cleared_at - from) / static_cast<double>(order.size());
+        for (std::size_t k = 0; k < order.size(); ++k) {
+            const std::size_t s = order[k];
+            const double at = from + step * static_cast<double>(k);
             ProgressPart part(progress_, at, at + step);
             std::optional<PaceAhead> ahead;
             if (leading) {
+                constexpr double kCornersMayGain = 1.25;  // by a narrower cutter
                 const double minutes = cleared[leader];
-                ahead = PaceAhead{{minutes, minutes, minutes, minutes}, {1, 1, 1, 1}, 1};
+                const bool narrower = sets_[s].tools.rough.diameter < sets_[leader].tools.rough.diameter;
+                ahead = PaceAhead{
+                    {minutes, minutes, minutes, minutes}, {1, 1, 1, 1}, narrower ? kCornersMayGain : 1};
             }
             LayerPaths paths = trials_.begin(sets_[s].tools);
             const bool keeps_up = paths.clear(&part, ahead);

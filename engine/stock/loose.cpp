@@ -161,18 +161,16 @@ private:
     }
 
     void mark_held() {
-        for (const Loops* region : {&slab_.kept, &slab_.glued}) {
-            const std::vector<std::vector<Span>> held = line_spans(*region, rows_of(grid_));
-            for (int j = 0; j < grid_.ny; ++j)
-                for (const Span& s : held[static_cast<std::size_t>(j)]) {
-                    const int i0 = std::max(
-                        0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid_.x0) / grid_.cell)));
-                    const int i1 = std::min(
-                        grid_.nx - 1,
-                        static_cast<int>(std::floor((s.high / kUnitsPerMm - grid_.x0) / grid_.cell)));
-                    if (i0 <= i1) std::fill_n(holds_.data() + grid_.index(i0, j), i1 - i0 + 1, char{1});
-                }
-        }
+        const std::vector<std::vector<Span>> held = line_spans(slab_.kept, rows_of(grid_));
+        for (int j = 0; j < grid_.ny; ++j)
+            for (const Span& s : held[static_cast<std::size_t>(j)]) {
+                const int i0 =
+                    std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid_.x0) / grid_.cell)));
+                const int i1 =
+                    std::min(grid_.nx - 1,
+                             static_cast<int>(std::floor((s.high / kUnitsPerMm - grid_.x0) / grid_.cell)));
+                if (i0 <= i1) std::fill_n(holds_.data() + grid_.index(i0, j), i1 - i0 + 1, char{1});
+            }
     }
 
     // Cells that are never cut through are there from the start, stretch by stretch of a row.

@@ -16,8 +16,7 @@ namespace slabwright {
 struct HeldSlab {
     std::array<double, 2> min{}, max{};
     double z_bottom = 0, z_top = 0;
-    Loops kept;   ///< what stays of the slab at its bottom: the pattern, the flask
-    Loops glued;  ///< what lies under it: waste over that is held from below
+    Loops kept;  ///< what of it stays and is glued to what is below: the pattern, the flask
 };
 
 /// A piece that nothing holds any more, when that happens.
@@ -32,8 +31,7 @@ struct LoosePiece {
 inline constexpr double kChip = 20;
 
 /// The pieces of at least `smallest_mm2` that the operations cut off, in the order in which they come loose.
-/// Waste is held when it hangs together, side by side, with what stays or with waste that lies on what is
-/// below.
+/// Waste is held when it hangs together, side by side, with what stays: no glue is put under waste.
 /// @param operations of one layer in the order of execution, straight moves only; face milling cuts nothing
 /// through
 /// @param cell mm between the grid's points; 0: 1 mm, coarser over slabs of more than 4 m²

@@ -51,13 +51,24 @@ bool stands_on(const LayerCut& cut, const Tool& tool, double floor) {
     return false;
 }
 
+// The layer's bottom, or what the flat that the boundary lies on shows above it by rounding: where that
+// forbade the bottom's level all of the slab over the flat would be left standing, and no glue holds it.
+double lowest_level(const LayerCut& cut) {
+    const double bottom = cut.layer.z_bottom;
+    double lowest = bottom;
+    for (const SolidFacet& f : cut.solid.facets)
+        if (f.z_max < bottom + kSameFloor) lowest = std::max(lowest, f.z_max);
+    return lowest;
+}
+
 // Where a level must lie: a floor of the flat end mill, or the bottom of what is cut, from which `floor` is
 // kept (mm).
 std::vector<RoughLevel> fixed_levels(const LayerCut& cut, const Tool& tool, double floor) {
-    const double bottom = cut.layer.z_bottom;
+    const double bottom = lowest_level(cut);
     std::vector<RoughLevel> fixed;
     for (const double z : cut.floors)
-        if (z + floor < cut.layer.z_top && (!clears_on_contours(cut.job) || stands_on(cut, tool, z)))
+        if (z > bottom && z + floor < cut.layer.z_top &&
+            (!clears_on_contours(cut.job) || stands_on(cut, tool, z)))
             fixed.push_back({z + floor, z});
     fixed.push_back({bottom, bottom});
     std::sort(fixed.begin(), fixed.end(),
@@ -68,6 +79,7 @@ std::vector<RoughLevel> fixed_levels(const LayerCut& cut, const Tool& tool, doub
 // From `top` down to fixed levels (descending) the steps that slopes and the tool allow.
 std::vector<RoughLevel> stepped(const LayerCut& cut, const Tool& tool, double floor, double top,
                                 std::span<const RoughLevel> fixed, double cusp) {
+    const double lowest = lowest_level(cut);
     std::vector<RoughLevel> levels;
     double z = top;
     for (const RoughLevel& f : fixed) {
@@ -82,7 +94,7 @@ std::vector<RoughLevel> stepped(const LayerCut& cut, const Tool& tool, double fl
             const double count = std::ceil((z - f.tip) / step - 1e-9);
             if (count <= 1) break;
             z -= (z - f.tip) / count;
-            levels.push_back({z, std::max(cut.layer.z_bottom, z - floor)});
+            levels.push_back({z, std::max(lowest, z - floor)});
         }
         levels.push_back(f);
         z = f.tip;
@@ -99,7 +111,7 @@ std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool, doub
 std::vector<RoughStep> terraced_steps(const LayerCut& cut, const Tool& tool, double floor, double cusp,
                                       const RoughSteps& wood) {
     const std::vector<RoughLevel> fixed = fixed_levels(cut, tool, floor);
-    const double top = cut.layer.z_top, bottom = cut.layer.z_bottom;
+    const double top = cut.layer.z_top, bottom = lowest_level(cut);
     std::vector<double> tips{bottom};
     for (int k = 0; k < wood.last_count && top - tips.back() > 1.5 * wood.last; ++k)
         tips.push_back(tips.back() + wood.last);
