@@ -18,6 +18,7 @@
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"
 #include "tests/data/sweep.h"
+#include "tests/support/plate_with.h"
 #include "tests/support/rs274.h"
 #include "tests/support/seed.h"
 
@@ -363,16 +364,8 @@ TEST(Arcs, OfRoughingTakeAShareOfWhatItLeaves) {
             chord);
     };
     const Outline plate = outline(half, 1, 0.01), post = outline(radius, radius, 0.001);
-    const Ring bottom = ring(plate, {0, 0}), edge = ring(plate, {0, 3}), foot = ring(post, {0, 3}),
-               top = ring(post, {0, 17});
-    std::vector<Facet> facets;
-    flat(facets, bottom, {}, false);
-    strip(facets, bottom, edge);
-    flat(facets, edge, {foot}, true);
-    strip(facets, foot, top);
-    flat(facets, top, {}, true);
     Context context;
-    const Plan plan = make_plan(context, weld(context, facets), {}, {});
+    const Plan plan = make_plan(context, weld(context, test::plate_with(plate, 3, post, 17)), {}, {});
     ASSERT_EQ(plan.layers.size(), 1U);
     const Tool end_mill = tool_of_kind(plan.job, ToolKind::flat);
     int arcs = 0;

@@ -17,6 +17,7 @@
 #include "kernels/stock/sweep.h"
 #include "tests/data/sweep.h"
 #include "tests/support/places.h"
+#include "tests/support/plate_with.h"
 #include "tests/support/seed.h"
 
 namespace slabwright {
@@ -327,16 +328,8 @@ TEST(Loose, WhatLiesOnTheBoundarysFlatIsRoughedAway) {
         const double x = static_cast<double>(random() % 100) - 100,
                      y = static_cast<double>(random() % 100) - 50;
         const Outline plate = plan_view(-150, -100, 150, 100), post = plan_view(x, y, x + 30, y + 30);
-        const Ring bottom = ring(plate, {0, 0}), edge = ring(plate, {0, 15}), foot = ring(post, {0, 15}),
-                   top = ring(post, {0, 30});
-        std::vector<Facet> facets;
-        flat(facets, bottom, {}, false);
-        strip(facets, bottom, edge);
-        flat(facets, edge, {foot}, true);
-        strip(facets, foot, top);
-        flat(facets, top, {}, true);
         Context context;
-        Mesh mesh = weld(context, facets);
+        Mesh mesh = weld(context, test::plate_with(plate, 15, post, 30));
         for (Vec3f& v : mesh.vertices)
             if (v.z == 15) v.z += static_cast<float>(random() % 9) * 1e-4F;
         const Plan plan = make_plan(context, mesh, {}, {});

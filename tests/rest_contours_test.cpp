@@ -19,10 +19,10 @@
 #include "io/verify.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"
-#include "tests/data/sweep.h"
 #include "tests/support/end_mill_job.h"
 #include "tests/support/height_field.h"
 #include "tests/support/places.h"
+#include "tests/support/plate_with.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
@@ -371,19 +371,12 @@ TEST(RestContours, NoToolIsTakenForNextToNothing) {
         for (std::size_t k = 0; k < tight; ++k) corners[k].radius = 5.8;
         const std::vector<Corner> block{{-70, -60, 10}, {70, -60, 10}, {70, 60, 10}, {-70, 60, 10}};
         const Outline outside = rounded_polygon(block, 0.01), inside = rounded_polygon(corners, 0.005);
-        const Ring bottom = ring(outside, {0, 0}), top = ring(outside, {0, 12}), rim = ring(inside, {0, 12}),
-                   floor = ring(inside, {0, 4});
-        std::vector<Facet> facets;
-        flat(facets, bottom, {}, false);
-        strip(facets, bottom, top);
-        flat(facets, top, {rim}, true);
-        strip(facets, rim, floor);
-        flat(facets, floor, {}, true);
         Context context;
+        const Mesh mesh = weld(context, test::plate_with(outside, 12, inside, 4));
         Job job;
         job.tools = shop_library();
         std::size_t count = 0;
-        for (const Layer& layer : make_plan(context, weld(context, facets), {}, job).layers)
+        for (const Layer& layer : make_plan(context, mesh, {}, job).layers)
             for (const Operation& op : layer.operations)
                 count += op.purpose == "narrow corners" || op.purpose == "waste in narrow places";
         return count;

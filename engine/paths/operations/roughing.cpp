@@ -77,9 +77,9 @@ std::vector<RoughLevel> fixed_levels(const LayerCut& cut, const Tool& tool, doub
 }
 
 // From `top` down to fixed levels (descending) the steps that slopes and the tool allow.
+// Nothing below `lowest` is spared.
 std::vector<RoughLevel> stepped(const LayerCut& cut, const Tool& tool, double floor, double top,
-                                std::span<const RoughLevel> fixed, double cusp) {
-    const double lowest = lowest_level(cut);
+                                std::span<const RoughLevel> fixed, double lowest, double cusp) {
     std::vector<RoughLevel> levels;
     double z = top;
     for (const RoughLevel& f : fixed) {
@@ -105,13 +105,14 @@ std::vector<RoughLevel> stepped(const LayerCut& cut, const Tool& tool, double fl
 }  // namespace
 
 std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool, double floor, double cusp) {
-    return stepped(cut, tool, floor, cut.layer.z_top, fixed_levels(cut, tool, floor), cusp);
+    const std::vector<RoughLevel> fixed = fixed_levels(cut, tool, floor);
+    return stepped(cut, tool, floor, cut.layer.z_top, fixed, fixed.back().tip, cusp);
 }
 
 std::vector<RoughStep> terraced_steps(const LayerCut& cut, const Tool& tool, double floor, double cusp,
                                       const RoughSteps& wood) {
     const std::vector<RoughLevel> fixed = fixed_levels(cut, tool, floor);
-    const double top = cut.layer.z_top, bottom = lowest_level(cut);
+    const double top = cut.layer.z_top, bottom = fixed.back().tip;
     std::vector<double> tips{bottom};
     for (int k = 0; k < wood.last_count && top - tips.back() > 1.5 * wood.last; ++k)
         tips.push_back(tips.back() + wood.last);
@@ -127,7 +128,7 @@ std::vector<RoughStep> terraced_steps(const LayerCut& cut, const Tool& tool, dou
         for (const RoughLevel& f : fixed)
             if (f.tip < above - 1e-3 && f.tip > z + 1e-3) between.push_back(f);
         between.push_back({z, std::max(bottom, z - floor)});
-        const std::vector<RoughLevel> levels = stepped(cut, tool, floor, above, between, cusp);
+        const std::vector<RoughLevel> levels = stepped(cut, tool, floor, above, between, bottom, cusp);
         const std::size_t lowest = steps.size();
         for (std::size_t i = levels.size(); i-- > 0;) steps.push_back({levels[i], above, lowest});
         above = z;
